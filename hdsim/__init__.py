@@ -1,0 +1,1 @@
+"""hdsim: dynamics of harmonic drives, from the rough tooth flank to the log."""

@@ -1,0 +1,131 @@
+"""The contract between a piece of the model and the model: parameters in, kernels out.
+
+Everything that an engineer can add to a drive (an effect, a load, a controller, a friction law) is a
+``Part``: its numbers, with units and bounds, and one method, ``contribute``, that hands kernels to a
+``Builder``. No part knows another one, and no table lists them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from hdsim.kernel import Kernel
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class State:
+    """A state that a part adds to the model.
+
+    Args:
+        name: its name in the log, unique in the model.
+        unit: SI unit.
+        initial: value at the start.
+        scale: size at which an error of rtol matters, in the state's unit; sets its absolute tolerance.
+        description: one line for the log.
+    """
+
+    name: str
+    unit: str
+    initial: float
+    scale: float
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Signature:
+    """The trace that an effect leaves in measured data.
+
+    Args:
+        lives_in: the coordinates in which its residual is a function, most telling first, among ``time``,
+            ``wave_generator_angle``, ``output_angle``, ``velocity``, ``direction``, ``time_since_reversal``,
+            ``torque``, ``temperature``, ``frequency``.
+        channels: the contract's channels in which it shows, most telling first.
+        orders: orders per wave-generator turn at which it appears, if it is periodic.
+        confused_with: names of effects that can look alike, with what separates them.
+    """
+
+    lives_in: tuple[str, ...]
+    channels: tuple[str, ...]
+    orders: tuple[float, ...] = ()
+    confused_with: dict[str, str] = field(default_factory=dict)
+
+
+class Parameters(BaseModel):
+    """Base of everything that a scenario can set: unknown keys refused, values checked, frozen."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True, strict=False
+    )
+
+
+class Builder(Protocol):
+    """What a part may ask of the model that it contributes to."""
+
+    ratio: float
+    """Signed ratio motor angle / output angle."""
+    rated_torque_nm: float
+    seed: int
+    """Seed of every random number of the run; derive one with ``numpy.random.default_rng([seed, ...])``."""
+
+    def element(
+        self,
+        kernel: Kernel,
+        parameters: Sequence[float] | Array,
+        *,
+        states: Sequence[State] = (),
+        last: bool = False,
+    ) -> int:
+        """Add an element; returns the index of its first own state. ``last`` runs it after all others."""
+
+    def twist(self, kernel: Kernel, parameters: Sequence[float] | Array) -> None:
+        """Add a contribution to the mesh twist (kinematic error and its kin)."""
+
+    def series_compliance(self, wind_up: Callable[[Array], Array]) -> None:
+        """Put a spring in series with the torsion spring: wind-up (rad, at the output) over torque (N m), odd."""
+
+    def widen_gap(self, half_gap_rad: float) -> None:
+        """Add to the half-gap of the mesh, as an angle at the output."""
+
+    def signal(self, signal: Any) -> int:
+        """Register a signal (``hdsim.actuation.signals``); returns the column of its value in the inputs.
+
+        The next three columns hold its first three derivatives.
+        """
+
+    def state_index(self, name: str) -> int | None:
+        """Index in the inputs of another part's state, or None when the model has none of that name."""
+
+    def sensor(self, channel: str, sensor: Any) -> None:
+        """Let ``sensor`` (see ``hdsim.effects.sensors``) stand between a channel and its reader."""
+
+
+class Part(Parameters):
+    """A piece of the model with parameters; subclasses say what it adds."""
+
+    def contribute(self, build: Builder) -> None:
+        """Hand this part's kernels to the builder."""
+        raise NotImplementedError
+
+
+class Effect(Part):
+    """A physical effect: one file in ``hdsim/effects``, off until a scenario names it.
+
+    Class attributes:
+        title: the field's standard term, for reports.
+        source: where the equation comes from.
+        signature: the trace it leaves in measured data.
+    """
+
+    title: ClassVar[str]
+    source: ClassVar[str]
+    signature: ClassVar[Signature]

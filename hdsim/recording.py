@@ -1,0 +1,115 @@
+"""Recordings: named arrays with units, the same for a simulated, a measured and a replayed run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One quantity of a table: ``values`` of shape (n,) or (n, k), its SI unit and one line of what it is."""
+
+    values: Array
+    unit: str
+    description: str = ""
+
+
+@dataclass
+class Table:
+    """Columns over one time axis. ``time`` has shape (n,), in s, strictly increasing."""
+
+    time: Array
+    columns: dict[str, Column] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Array:
+        """Values of a column."""
+        try:
+            return self.columns[name].values
+        except KeyError:
+            raise InputError(f"no channel {name!r}; there are: {', '.join(self.columns)}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at ``time`` (s); ``level`` is ``info``, ``warning`` or ``error``."""
+
+    time: float
+    level: str
+    source: str
+    message: str
+
+
+@dataclass
+class Recording:
+    """A run: tables by name (``state`` at full rate, ``teeth`` at its own), static arrays, events, provenance.
+
+    ``recording["motor_angle"]`` reads the state table. ``static`` holds what does not change in time
+    (tooth angles, gaps). ``metadata`` maps names to text (scenario, versions, seed, solver, tolerances).
+    """
+
+    tables: dict[str, Table]
+    static: dict[str, Column] = field(default_factory=dict)
+    events: list[Event] = field(default_factory=list)
+    metadata: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def state(self) -> Table:
+        """The table at full rate."""
+        return self.tables["state"]
+
+    @property
+    def time(self) -> Array:
+        """Time of the state table, in s."""
+        return self.state.time
+
+    @property
+    def channels(self) -> Mapping[str, Column]:
+        """Columns of the state table."""
+        return self.state.columns
+
+    def __getitem__(self, name: str) -> Array:
+        """Values of a channel of the state table."""
+        return self.state[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.state
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.state.columns)
+
+    def unit(self, name: str) -> str:
+        """Unit of a channel of the state table."""
+        self.state[name]
+        return self.state.columns[name].unit
+
+    def save(self, path: str | Path) -> Path:
+        """Write the recording as an MCAP log; returns its path."""
+        from hdsim.log import write_log
+
+        return write_log(self, path)
+
+    def plot(self, **options: Any) -> Figure:
+        """Draw the one-page figure of the run."""
+        from hdsim.plot import plot_recording
+
+        return plot_recording(self, **options)
