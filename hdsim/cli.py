@@ -1,0 +1,119 @@
+"""The command line. A command's module is imported when the command is invoked, not before."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import Any
+
+import click
+
+from hdsim.errors import HdsimError
+
+#: Where each command lives, and its line in ``hdsim --help``.
+COMMANDS: dict[str, tuple[str, str]] = {
+    "check": ("hdsim.scenario.commands:check", "Check scenarios and say what they describe."),
+    "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios, for editors."),
+    "effects": ("hdsim.scenario.commands:effects", "List the physical effects that a scenario can turn on."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group that knows its commands by name and imports one only to run it."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        """Names, in the order of the table."""
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        """Import a command.
+
+        Raises:
+            click.UsageError: (by click) when there is none of that name.
+        """
+        if name not in COMMANDS:
+            return None
+        module, _, function = COMMANDS[name][0].partition(":")
+        command: click.Command = getattr(importlib.import_module(module), function)
+        return command
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands from the table, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+
+    def resolve_command(
+        self, context: click.Context, arguments: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find a command; an unknown one is refused with the nearest known."""
+        name = arguments[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            from difflib import get_close_matches
+
+            near = get_close_matches(name, COMMANDS, 1)
+            hint = f" Did you mean {near[0]!r}?" if near else f" There are: {', '.join(COMMANDS)}."
+            context.fail(f"No command {name!r}.{hint}")
+        return super().resolve_command(context, arguments)
+
+
+def _print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted and not context.resilient_parsing:
+        from importlib.metadata import version
+
+        click.echo(f"hdsim {version('hdsim')}")
+        context.exit()
+
+
+@click.group(
+    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
+@click.option("--debug", is_flag=True, help="Show the Python traceback of an error.")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Show the version.",
+)
+def hdsim(debug: bool) -> None:
+    """Simulate harmonic drives, from the rough tooth flank to the log."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit: 0 done, 1 a check failed, 2 bad input, 130 interrupted.
+
+    Args:
+        arguments: what follows ``hdsim``; those of the process when None.
+
+    Raises:
+        SystemExit: always.
+    """
+    given = sys.argv[1:] if arguments is None else arguments
+    # Taken from the raw arguments, because the error may come before click has read them.
+    debug = "--debug" in given
+    try:
+        result: Any = hdsim.main(args=given, prog_name="hdsim", standalone_mode=False)
+    except click.ClickException as error:
+        if debug:
+            raise
+        error.show()
+        sys.exit(2)
+    except HdsimError as error:
+        if debug:
+            raise
+        for line in str(error).split("\n"):
+            click.echo(f"error: {line}", err=True)
+        sys.exit(2)
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("interrupted", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader of a pipe went away (``| head``); flushing the rest at exit would complain again.
+        sys.stdout = None
+        sys.exit(0)
+    sys.exit(result if isinstance(result, int) else 0)
+
+
+if __name__ == "__main__":
+    main()

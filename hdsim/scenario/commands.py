@@ -1,0 +1,72 @@
+"""Commands about scenarios: ``check``, ``schema``, ``effects``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from hdsim.scenario.problems import ScenarioError
+
+
+@click.command(short_help="Check scenarios and say what they describe.")
+@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+def check(files: tuple[str, ...]) -> None:
+    """Check scenarios: one line for every mistake, or OK and what each describes."""
+    from hdsim.scenario.model import Scenario
+
+    problems = []
+    for file in files:
+        try:
+            scenario = Scenario.from_yaml(file)
+        except ScenarioError as error:
+            problems += error.problems
+        else:
+            click.echo(f"{file}: OK\n{scenario.summary()}")
+    if problems:
+        raise ScenarioError(problems)
+
+
+@click.command(short_help="Print the JSON schema of scenarios, for editors.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write it to this file.")
+def schema(output: Path | None) -> None:
+    """Print the JSON schema (draft 2020-12) of scenarios.
+
+    An editor with the YAML language server completes and checks a scenario that begins with the line
+
+    # yaml-language-server: $schema=hdsim.schema.json
+    """
+    import json
+
+    from hdsim.errors import InputError
+    from hdsim.scenario.model import Scenario
+    from hdsim.scenario.schema import json_schema
+
+    text = json.dumps(json_schema(Scenario), indent=2)
+    if output is None:
+        click.echo(text)
+        return
+    try:
+        output.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written ({error.strerror})") from error
+    click.echo(f"wrote {output}; begin a scenario with\n# yaml-language-server: $schema={output.as_posix()}")
+
+
+@click.command(short_help="List the physical effects that a scenario can turn on.")
+def effects() -> None:
+    """List the physical effects that a scenario can turn on, with their sources and the orders they show."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from hdsim.effects import catalogue
+
+    table = Table("effect", "what it is", "source", "orders per wave-generator turn")
+    for name, effect in catalogue().items():
+        orders = ", ".join(f"{order:g}" for order in effect.signature.orders)
+        table.add_row(name, effect.title, effect.source, orders)
+    console = Console()
+    if not console.is_terminal:
+        # A pipe has no width; wrapping at 80 columns would break names.
+        console = Console(width=200)
+    console.print(table)
