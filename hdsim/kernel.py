@@ -39,6 +39,8 @@ SUPPLIED = 6  #: W supplied from outside (motor)
 DELIVERED = 7  #: W delivered to the outside (load torque)
 STORED = 8  #: J stored in the element; no derivative is read
 INPUT_FRICTION = 9  #: N m, friction on the motor shaft, for the log; no derivative is read
+COMMANDED_TORQUE = 10  #: N m, torque of the motor's windings, for the log; no derivative is read
+LOAD_TORQUE = 11  #: N m, known external torque on the output, for the log; no derivative is read
 
 #: First index of the elements' own states, in the inputs and in the outputs (there: their rates).
 OWN = 12

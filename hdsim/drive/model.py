@@ -1,0 +1,326 @@
+"""A drive and its parts, assembled into an ODE that SciPy's solvers integrate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.drive import friction
+from hdsim.drive.parameters import Drive, LumpedMesh, RigidMesh, TabulatedMesh, TeethMesh
+from hdsim.errors import InputError
+from hdsim.kernel import OWN, SIGNAL_VALUES, Kernel
+
+if TYPE_CHECKING:
+    from hdsim.drive.toothed import Teeth
+    from hdsim.parts import Part, State
+    from hdsim.simulation.system import System
+
+Array = NDArray[np.float64]
+
+#: Names of the three coordinates, in the order of the compiled code.
+COORDINATES = ("motor", "ring", "output")
+
+
+@dataclass
+class _Contributions:
+    """What the parts have handed in during one pass."""
+
+    elements: list[tuple[Kernel, Array, int, bool]] = field(default_factory=list)
+    twists: list[tuple[Kernel, Array]] = field(default_factory=list)
+    signals: list[Any] = field(default_factory=list)
+    states: list[State] = field(default_factory=list)
+    wind_ups: list[Callable[[Array], Array]] = field(default_factory=list)
+    sensors: dict[str, list[Any]] = field(default_factory=dict)
+    half_gap_rad: float = 0.0
+
+
+class Model:
+    """A drive with its parts; the ``Builder`` that parts contribute to.
+
+    Args:
+        drive: the drive's numbers.
+        parts: effects, load, controllers: anything with ``contribute``.
+        load_inertia_kg_m2: inertia on the output, kg m^2.
+        motions: signals that prescribe ``motor`` or ``output`` angles (rad).
+        seed: seed of the random tooth surfaces and of all noise.
+
+    Attributes:
+        system: the ODE, a ``hdsim.simulation.system.System``.
+        states: the parts' own states in their order in the state vector.
+        teeth: gaps, pitch errors and contact table of the toothed meshes, else None.
+    """
+
+    def __init__(
+        self,
+        drive: Drive,
+        parts: Sequence[Part] = (),
+        *,
+        load_inertia_kg_m2: float,
+        motions: dict[str, Any] | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.drive = drive
+        self.parts = tuple(parts)
+        self.ratio = drive.ratio
+        self.rated_torque_nm = drive.rated_torque_nm
+        self.viscous_friction_nm_s_per_rad = drive.friction.viscous_nm_s_per_rad
+        self.coulomb_friction_nm = drive.friction.coulomb_nm
+        self.seed = seed
+        self.motions = dict(motions or {})
+        self.load_inertia_kg_m2 = load_inertia_kg_m2
+        self.teeth: Teeth | None = None
+        self._own_before = 0
+        self._names: dict[str, int] = {}
+        # The signals' columns follow the own states, whose number is known only after a first pass.
+        for _ in range(2):
+            self._given = _Contributions()
+            self.motion_columns = {name: self.signal(motion) for name, motion in self.motions.items()}
+            self._contribute_drive()
+            for part in self.parts:
+                part.contribute(self)
+            self._own_before = len(self._given.states)
+            self._names = {state.name: OWN + k for k, state in enumerate(self._given.states)}
+        if len(self._names) < len(self._given.states):
+            raise InputError("two parts of the model add a state of the same name")
+        self.states = tuple(self._given.states)
+        self.signals = tuple(self._given.signals)
+        self.sensors = self._given.sensors
+        self.system = self._assemble()
+
+    # What parts may call (``hdsim.parts.Builder``).
+
+    def element(
+        self,
+        kernel: Kernel,
+        parameters: Sequence[float] | Array,
+        *,
+        states: Sequence[State] = (),
+        last: bool = False,
+    ) -> int:
+        """Add an element; see ``hdsim.parts.Builder.element``."""
+        first = OWN + len(self._given.states)
+        self._given.states.extend(states)
+        self._given.elements.append((kernel, np.asarray(parameters, dtype=np.float64), first, last))
+        return first
+
+    def twist(self, kernel: Kernel, parameters: Sequence[float] | Array) -> None:
+        """Add a contribution to the mesh twist."""
+        self._given.twists.append((kernel, np.asarray(parameters, dtype=np.float64)))
+
+    def series_compliance(self, wind_up: Callable[[Array], Array]) -> None:
+        """Put a spring in series with the torsion spring."""
+        self._given.wind_ups.append(wind_up)
+
+    def widen_gap(self, half_gap_rad: float) -> None:
+        """Add to the half-gap of the mesh (rad at the output)."""
+        self._given.half_gap_rad += half_gap_rad
+
+    def signal(self, signal: Any) -> int:
+        """Register a signal; returns the column of its value."""
+        self._given.signals.append(signal)
+        return OWN + self._own_before + SIGNAL_VALUES * (len(self._given.signals) - 1)
+
+    def state_index(self, name: str) -> int | None:
+        """Index in the inputs of a part's state, or None."""
+        return self._names.get(name)
+
+    def sensor(self, channel: str, sensor: Any) -> None:
+        """Put a sensor between a channel and its reader."""
+        self._given.sensors.setdefault(channel, []).append(sensor)
+
+    # The drive's own part.
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the mesh has no compliance."""
+        return isinstance(self.drive.mesh, RigidMesh)
+
+    @property
+    def has_ring(self) -> bool:
+        """Whether the ring is a degree of freedom."""
+        mesh = self.drive.mesh
+        return isinstance(mesh, TeethMesh | TabulatedMesh) and mesh.ring == "dynamic"
+
+    def _contribute_drive(self) -> None:
+        friction.contribute_friction(self, self.drive.friction)
+        damping = self.drive.torsion.damping_nm_s_per_rad
+        if damping > 0 and not self.rigid:
+            self.element(friction.torsion_damping, [damping])
+        mesh = self.drive.mesh
+        if isinstance(mesh, TeethMesh | TabulatedMesh) and mesh.damping_nm_s_per_rad > 0:
+            self.element(friction.mesh_damping, [mesh.damping_nm_s_per_rad])
+
+    def _mesh_parameters(self) -> tuple[Kernel | None, Array]:
+        """The mesh kernel and its numbers."""
+        from hdsim.drive import _mesh, spring, toothed
+
+        mesh = self.drive.mesh
+        if isinstance(mesh, RigidMesh):
+            return None, np.zeros(0)
+        if isinstance(mesh, LumpedMesh):
+            torsion = self.drive.torsion
+            reach = spring.TABLE_REACH * self.rated_torque_nm
+            step, cells = spring.spring_cells(
+                [lambda torque: spring.catalogue_wind_up(torsion, torque), *self._given.wind_ups],
+                [torsion.torque_t1_nm, torsion.torque_t2_nm],
+                reach,
+            )
+            parameters = np.zeros(_mesh.HEADER)
+            parameters[_mesh.INVERSE_RATIO] = 1 / self.ratio
+            parameters[_mesh.EXTRA_GAP] = self._given.half_gap_rad
+            parameters[_mesh.SPRING_STEP] = step
+            parameters[_mesh.SPRING_CELLS] = len(cells)
+            parameters[_mesh.SPRING_AT] = _mesh.HEADER
+            return _mesh.lumped_mesh, np.concatenate([parameters, cells.ravel()])
+        self.teeth = toothed.Teeth(
+            self.drive,
+            mesh,
+            self._given.wind_ups,
+            extra_half_gap_rad=self._given.half_gap_rad,
+            seed=self.seed,
+        )
+        kernel = _mesh.table_mesh if isinstance(mesh, TabulatedMesh) else _mesh.teeth_mesh
+        return kernel, self.teeth.parameters
+
+    @property
+    def kinematics(self) -> tuple[float, float, float]:
+        """(g, nu, kappa) of the arrangement, see ``hdsim.drive._mesh``."""
+        geometry = self.drive.geometry
+        if self.drive.arrangement == "circular_spline_fixed":
+            return 1.0, 0.0, 1.0
+        return -geometry.circular_spline_teeth / geometry.flexspline_teeth, 1.0, 0.0
+
+    @property
+    def inertias(self) -> tuple[float, float, float]:
+        """Inertia of motor, ring and output, kg m^2; a ring without its own coordinate moves with the output."""
+        inertia = self.drive.inertia
+        output = self.load_inertia_kg_m2
+        if not self.has_ring and self.drive.arrangement == "circular_spline_fixed":
+            output += inertia.ring_kg_m2
+        return inertia.motor_kg_m2 + inertia.wave_generator_kg_m2, inertia.ring_kg_m2, output
+
+    def _assemble(self) -> System:
+        from hdsim.drive import _assembly as a
+        from hdsim.simulation.system import System
+
+        given = self._given
+        if "output" in self.motions and self.rigid:
+            raise InputError("a rigid drive cannot have its output prescribed: prescribe the motor")
+        kernel, mesh_parameters = self._mesh_parameters()
+        free = [name for name in COORDINATES if self._is_free(name)]
+        states = 2 * len(free) + len(given.states) + 3
+        columns = OWN + len(given.states) + SIGNAL_VALUES * len(given.signals)
+        rows = OWN + len(given.states)
+        gain, output_share, kappa = self.kinematics
+
+        reals = [np.zeros(a.PARAMETERS)]
+        head = reals[0]
+        head[a.INERTIA : a.INERTIA + 3] = self.inertias
+        head[a.INVERSE_RATIO] = 1 / self.ratio
+        head[a.GAIN], head[a.OUTPUT_SHARE], head[a.KAPPA] = gain, output_share, kappa
+        head[a.LAMBDA + 1] = kappa / self.ratio
+        head[a.LAMBDA + 2] = 1 / self.ratio
+        length = a.PARAMETERS
+
+        def place(values: Array) -> int:
+            nonlocal length
+            at = length
+            reals.append(values)
+            length += len(values)
+            return at
+
+        lists: list[int] = []
+        ordered = sorted(given.elements, key=lambda entry: entry[3])
+        self.element_places: list[tuple[Kernel, int]] = []
+        for element_kernel, parameters, own, _ in ordered:
+            at = place(parameters)
+            lists += [element_kernel.address, at, own]
+            self.element_places.append((element_kernel, at))
+        for twist_kernel, parameters in given.twists:
+            lists += [twist_kernel.address, place(parameters)]
+        for signal in given.signals:
+            lists += [signal.kernel.address, place(np.asarray(signal.pack(), dtype=np.float64))]
+
+        head_integers = np.zeros(a.LISTS, dtype=np.int64)
+        head_integers[a.STATES] = states
+        head_integers[a.OWN_STATES] = len(given.states)
+        head_integers[a.SIGNALS] = len(given.signals)
+        head_integers[a.ELEMENTS] = len(given.elements)
+        head_integers[a.TWISTS] = len(given.twists)
+        head_integers[a.COLUMNS] = columns
+        head_integers[a.STATE_OF : a.STATE_OF + 3] = -1
+        head_integers[a.SIGNAL_OF : a.SIGNAL_OF + 3] = -1
+        self.place_of = {name: 2 * k for k, name in enumerate(free)}
+        for k, name in enumerate(COORDINATES):
+            if name in self.place_of:
+                head_integers[a.STATE_OF + k] = self.place_of[name]
+            if name in self.motion_columns:
+                head_integers[a.SIGNAL_OF + k] = self.motion_columns[name]
+        if kernel is None:
+            head_integers[a.RING] = a.RIGID
+        else:
+            head_integers[a.MESH_ADDRESS] = kernel.address
+            head_integers[a.MESH_AT] = place(mesh_parameters)
+            if self.has_ring:
+                head_integers[a.RING] = a.RING_DYNAMIC
+            else:
+                toothed = isinstance(self.drive.mesh, TeethMesh | TabulatedMesh)
+                head_integers[a.RING] = a.RING_STATIC if toothed else a.RING_ABSENT
+        scratch = a.S_INPUTS + columns + rows + rows * columns
+        head_integers[a.REALS] = length
+        head_integers[a.SCRATCH] = scratch
+        head_integers[a.INTEGERS] = a.LISTS + len(lists)
+        self._columns = columns
+        y0, scale = self._initial(states)
+        return System(
+            kernel=a.drive_system,
+            integers=np.concatenate([head_integers, np.array(lists, dtype=np.int64)]),
+            reals=np.concatenate(reals),
+            scratch_size=scratch,
+            y0=y0,
+            quadratures=3,
+            scale=scale,
+        )
+
+    def _is_free(self, name: str) -> bool:
+        if name in self.motions:
+            return False
+        if name == "ring":
+            return self.has_ring
+        return not (name == "output" and self.rigid)
+
+    def _initial(self, size: int) -> tuple[Array, Array]:
+        """Initial states and the sizes at which their errors matter."""
+        y0, scale = np.zeros(size), np.zeros(size)
+        torsion = self.drive.torsion
+        wind_up = self.rated_torque_nm / torsion.stiffness_k3_nm_per_rad
+        _, _, output = self.inertias
+        for name, at in self.place_of.items():
+            angle = wind_up * (abs(self.ratio) if name == "motor" else 1.0)
+            scale[at] = angle
+            # Velocity of the slow torsional mode at that amplitude.
+            scale[at + 1] = angle * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / max(output, 1e-3)))
+        for k, state in enumerate(self.states):
+            y0[size - 3 - len(self.states) + k] = state.initial
+            scale[size - 3 - len(self.states) + k] = state.scale
+        scale[-3:] = self.rated_torque_nm * wind_up
+        return y0, scale
+
+    def initial_state(
+        self, *, motor_angle: float = 0.0, motor_velocity: float = 0.0, output_twist: float = 0.0
+    ) -> Array:
+        """State vector for a motor angle (rad), a velocity (rad/s) and a twist of the output (rad).
+
+        Ring and output start at the ideal gear's angle, the output displaced by ``-output_twist``.
+        """
+        y = self.system.y0.copy()
+        if "motor" in self.place_of:
+            y[self.place_of["motor"]] = motor_angle
+            y[self.place_of["motor"] + 1] = motor_velocity
+        if "output" in self.place_of:
+            y[self.place_of["output"]] = -output_twist
+        return y

@@ -1,0 +1,210 @@
+"""The numbers of a drive, with units, bounds and the preset that fills what the user leaves out."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from hdsim.contact.parameters import ContactParameters, MajumdarBhushanParameters
+from hdsim.parts import Parameters
+from hdsim.surface.parameters import RoughFlanks
+
+Arrangement = Literal["circular_spline_fixed", "flexspline_fixed"]
+
+
+class Geometry(Parameters):
+    """Tooth counts and the circle on which the teeth meet."""
+
+    flexspline_teeth: int = Field(200, ge=20, le=2000)
+    """Teeth of the flexspline."""
+    circular_spline_teeth: int = Field(202, ge=22, le=2002)
+    """Teeth of the circular spline; two more than the flexspline's for a two-lobed wave generator."""
+    pitch_radius_m: float = Field(0.025, gt=0, le=1)
+    """Radius of the circle on which the teeth meet, m."""
+    pressure_angle_deg: float = Field(10.0, ge=0, lt=90)
+    """Angle between a tooth's normal force and its tangential force, degrees."""
+
+    @model_validator(mode="after")
+    def _two_lobes(self) -> Geometry:
+        if self.circular_spline_teeth - self.flexspline_teeth != 2:
+            raise ValueError(
+                f"circular_spline_teeth must exceed flexspline_teeth by 2 (two-lobed wave generator), "
+                f"found {self.circular_spline_teeth} and {self.flexspline_teeth}"
+            )
+        return self
+
+
+class Torsion(Parameters):
+    """Torsional stiffness of the whole drive at the output, input locked, in the catalogue's three segments."""
+
+    stiffness_k1_nm_per_rad: float = Field(gt=0)
+    """Secant stiffness from 0 to the first torque, N m/rad."""
+    stiffness_k2_nm_per_rad: float = Field(gt=0)
+    """Secant stiffness from the first to the second torque, N m/rad."""
+    stiffness_k3_nm_per_rad: float = Field(gt=0)
+    """Stiffness above the second torque, N m/rad."""
+    torque_t1_nm: float = Field(gt=0)
+    """End of the first segment, N m."""
+    torque_t2_nm: float = Field(gt=0)
+    """End of the second segment, N m."""
+    wave_generator_stiffness_nm_per_rad: float | None = Field(None, gt=0)
+    """Share of the chain that is the wave generator's bearing, as a stiffness at the output, N m/rad."""
+    corner_smoothing_nm: float = Field(0.0, ge=0)
+    """Half-width in torque over which a corner between two segments is rounded (0: sharp), N m."""
+    damping_nm_s_per_rad: float = Field(0.0, ge=0)
+    """Viscous damping parallel to the torsion spring, at the output, N m s/rad."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Torsion:
+        if self.torque_t2_nm <= self.torque_t1_nm:
+            raise ValueError(
+                f"torque_t2_nm must exceed torque_t1_nm, found {self.torque_t2_nm} <= {self.torque_t1_nm}"
+            )
+        return self
+
+
+class Inertia(Parameters):
+    """Moments of inertia of the drive's own parts; the load's belongs to the load."""
+
+    motor_kg_m2: float = Field(0.5e-4, gt=0)
+    """Motor rotor with what sits on its shaft, kg m^2."""
+    wave_generator_kg_m2: float = Field(0.193e-4, ge=0)
+    """Wave generator with its bearing's inner ring, kg m^2."""
+    ring_kg_m2: float = Field(2.0e-5, gt=0)
+    """Toothed ring of the flexspline, kg m^2."""
+
+
+class Friction(Parameters):
+    """Friction on the input: (Coulomb + c_L |output torque| / ratio) sign(speed) + viscous * speed.
+
+    The sign is tanh(speed / smoothing speed): below the smoothing speed the drive creeps instead of sticking.
+    """
+
+    coulomb_nm: float = Field(0.0, ge=0)
+    """Coulomb friction at the motor shaft, N m."""
+    viscous_nm_s_per_rad: float = Field(0.0, ge=0)
+    """Viscous friction at the motor shaft, N m s/rad."""
+    load_coefficient: float = Field(0.0, ge=0, lt=1)
+    """Share of the transmitted torque, reduced to the motor shaft, that is lost in the mesh (c_L)."""
+    smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
+    """Motor speed over which sign(speed) is smoothed, rad/s."""
+
+
+class WindowEngagement(Parameters):
+    """Two opposite arcs of teeth carry load, centred on the wave generator's major axis."""
+
+    kind: Literal["window"] = "window"
+    share: float = Field(0.30, gt=0, le=0.9)
+    """Share of the teeth that the arcs hold (sum of the weights over the number of teeth)."""
+    edge_teeth: float = Field(8.0, gt=0)
+    """Teeth over which the weight rises from 0 to 1 at each end of an arc."""
+
+
+class ClearanceEngagement(Parameters):
+    """The gap grows away from the major axis as (1 - cos 2 phi)/2, so the engaged share grows with torque."""
+
+    kind: Literal["clearance"] = "clearance"
+    share: float = Field(0.30, gt=0, le=0.9)
+    """Share of the teeth in contact at rated torque; the clearance is calibrated to it."""
+    clearance_m: float | None = Field(None, gt=0)
+    """Clearance on the minor axis, m; given instead of the calibration."""
+
+
+Engagement = Annotated[WindowEngagement | ClearanceEngagement, Field(discriminator="kind")]
+
+
+class ToothedMesh(Parameters):
+    """What the meshes with teeth have in common."""
+
+    engagement: Engagement = WindowEngagement()
+    flanks: RoughFlanks = RoughFlanks()
+    contact: ContactParameters = MajumdarBhushanParameters()
+    tooth_bending_stiffness_n_per_m: float | None = Field(1.4e8, gt=0)
+    """Bending stiffness of one tooth pair in series with its contact, N/m (null: rigid teeth)."""
+    pitch_error_m: float = Field(0.0, ge=0)
+    """Standard deviation of the teeth's pitch error, m."""
+    half_gap_m: float | None = Field(None, ge=0)
+    """The same half-gap for every tooth, m; given instead of the Weierstrass-Mandelbrot backlash."""
+    gap_along_flank: bool = False
+    """Let the gap follow the flank's profile as the contact point slides, instead of each tooth's average."""
+    damping_nm_s_per_rad: float = Field(0.0, ge=0)
+    """Viscous damping parallel to the mesh, as a torsional damping at the output, N m s/rad."""
+    ring: Literal["dynamic", "static"] = "dynamic"
+    """Ring inertia as a degree of freedom, or eliminated by static balance of mesh and cup."""
+
+
+class TeethMesh(ToothedMesh):
+    """Every tooth pair on its own."""
+
+    model: Literal["teeth"] = "teeth"
+
+
+class TabulatedMesh(ToothedMesh):
+    """The torque of all teeth from a table over mesh twist and wave-generator angle."""
+
+    model: Literal["tabulated"]
+    twist_nodes: int = Field(400, ge=20, le=4000)
+    """Nodes over the mesh twist."""
+    angle_nodes: int = Field(400, ge=50, le=4000)
+    """Nodes over half a turn of the wave generator."""
+
+
+class LumpedMesh(Parameters):
+    """The catalogue's stiffness alone: no teeth, no gap, no ring."""
+
+    model: Literal["lumped"]
+
+
+class RigidMesh(Parameters):
+    """No compliance at all: the output follows the motor, kinematic error included."""
+
+    model: Literal["rigid"]
+
+
+Mesh = Annotated[TeethMesh | TabulatedMesh | LumpedMesh | RigidMesh, Field(discriminator="model")]
+
+
+class Drive(Parameters):
+    """A harmonic drive. ``preset`` fills every number that is not given here."""
+
+    preset: str | None = None
+    """Name of a preset (``hdsim presets`` lists them)."""
+    arrangement: Arrangement = "circular_spline_fixed"
+    """Which component is fixed; the other of the two splines is the output."""
+    rated_torque_nm: float = Field(gt=0)
+    """Rated output torque, N m."""
+    geometry: Geometry = Geometry()
+    torsion: Torsion
+    inertia: Inertia = Inertia()
+    friction: Friction = Friction()
+    mesh: Mesh = TeethMesh()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_from_preset(cls, given: Any) -> Any:
+        """Merge what is given over the preset, section by section."""
+        if not isinstance(given, dict) or not isinstance(given.get("preset"), str):
+            return given
+        from hdsim.drive.presets import preset
+
+        return _merged(preset(given["preset"]), given)
+
+    @property
+    def ratio(self) -> float:
+        """Signed ratio motor angle / output angle: -z_f/(z_c - z_f) or z_c/(z_c - z_f)."""
+        z_f, z_c = self.geometry.flexspline_teeth, self.geometry.circular_spline_teeth
+        return -z_f / (z_c - z_f) if self.arrangement == "circular_spline_fixed" else z_c / (z_c - z_f)
+
+
+def _merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """``over`` laid over ``base``, mappings merged; a change of a mesh's model or a law drops the base's."""
+    result = dict(base)
+    for key, value in over.items():
+        below = result.get(key)
+        if isinstance(value, dict) and isinstance(below, dict):
+            changed = any(tag in value and value[tag] != below.get(tag) for tag in ("model", "law", "kind"))
+            result[key] = dict(value) if changed else _merged(below, value)
+        else:
+            result[key] = value
+    return result

@@ -1,0 +1,139 @@
+"""The torsion chain: the catalogue's wind-up, the share that the mesh already has, and the rest as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.errors import PhysicsError
+
+if TYPE_CHECKING:
+    from hdsim.drive.parameters import Torsion
+
+Array = NDArray[np.float64]
+
+#: Torque up to which the torsion table reaches, as a multiple of the rated torque; linear beyond.
+TABLE_REACH = 4.0
+CELLS = 2048
+
+
+def catalogue_wind_up(torsion: Torsion, torque: Array) -> Array:
+    """Twist (rad) of the output over torque (N m), input locked: three straight segments, odd.
+
+    phi = T/K1 up to T1, then 1/K2 and from T2 on 1/K3 (the catalogue's definition); each corner may be
+    rounded over +- ``corner_smoothing_nm``.
+    """
+    size = np.abs(torque)
+    c1, c2, c3 = (
+        1 / torsion.stiffness_k1_nm_per_rad,
+        1 / torsion.stiffness_k2_nm_per_rad,
+        1 / torsion.stiffness_k3_nm_per_rad,
+    )
+    width = torsion.corner_smoothing_nm
+    twist = c1 * size
+    for corner, change in ((torsion.torque_t1_nm, c2 - c1), (torsion.torque_t2_nm, c3 - c2)):
+        past = size - corner
+        ramp = np.maximum(past, 0.0)
+        if width > 0:
+            ramp = np.where(np.abs(past) < width, (past + width) ** 2 / (4 * width), ramp)
+            # Without this the rounded corner would leave a twist at zero torque.
+            at_zero = max(0.0, width - corner) ** 2 / (4 * width)
+            ramp = ramp - at_zero
+        twist = twist + change * ramp
+    return np.sign(torque) * twist
+
+
+def structure_wind_up(
+    torsion: Torsion, rated_torque_nm: float, mesh_wind_up: Callable[[float], float]
+) -> Callable[[Array], Array]:
+    """Wind-up of cup and wave-generator bearing: what the catalogue's total leaves beside the mesh.
+
+    The catalogue gives secants between 0, T1, T2 and the rated torque T_N, and the total must have them:
+    on each segment the structure's compliance is the catalogue's less the mesh's secant compliance.
+
+    Args:
+        torsion: the catalogue's segments.
+        rated_torque_nm: end of the third segment.
+        mesh_wind_up: twist (rad, at the output) of the mesh at a torque (N m), gap included.
+
+    Raises:
+        PhysicsError: the mesh alone is softer than the catalogue's whole drive on a segment.
+    """
+    corners = [0.0, torsion.torque_t1_nm, torsion.torque_t2_nm]
+    corners.append(max(rated_torque_nm, 1.2 * torsion.torque_t2_nm))
+    total = catalogue_wind_up(torsion, np.array(corners))
+    mesh = np.array([0.0] + [mesh_wind_up(torque) for torque in corners[1:]])
+    compliance = np.diff(total - mesh) / np.diff(corners)
+    for k, value in enumerate(compliance):
+        if value <= 0:
+            raise PhysicsError(
+                f"the mesh alone winds up {np.diff(mesh)[k]:.3g} rad between {corners[k]:.3g} and "
+                f"{corners[k + 1]:.3g} N m, the catalogue's whole drive only {np.diff(total)[k]:.3g} rad "
+                f"(stiffness_k{k + 1}_nm_per_rad): lower the gap, or raise contact or torsional stiffness"
+            )
+    inner = np.concatenate([[0.0], np.cumsum(compliance * np.diff(corners))])
+
+    def wind_up(torque: Array) -> Array:
+        size = np.abs(torque)
+        twist = np.interp(size, corners, inner) + np.maximum(size - corners[-1], 0.0) * compliance[-1]
+        return np.sign(torque) * twist
+
+    return wind_up
+
+
+def spring_cells(
+    wind_ups: Sequence[Callable[[Array], Array]],
+    corners_nm: Sequence[float],
+    largest_torque_nm: float,
+    *,
+    scale: float = 1.0,
+) -> tuple[float, Array]:
+    """Torque over twist of springs in series, as quartic-energy cells for the compiled mesh.
+
+    Args:
+        wind_ups: odd, increasing functions from torque (N m) to twist (rad), both at the output.
+        corners_nm: torques where a wind-up has a corner.
+        largest_torque_nm: end of the table.
+        scale: |g| of the arrangement: twist at the ring is scale times, torque 1/scale times the output's.
+
+    Returns:
+        Cell width (rad) and coefficients of shape (CELLS, 5), see ``hdsim.contact.table``.
+
+    Raises:
+        PhysicsError: the total wind-up does not increase with torque.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    torque = np.unique(np.concatenate([np.linspace(0.0, largest_torque_nm, 4001), np.asarray(corners_nm)]))
+    torque = torque[torque <= largest_torque_nm]
+    twist = scale * np.sum([wind_up(torque) for wind_up in wind_ups], axis=0)
+    if np.any(np.diff(twist) <= 0):
+        bad = torque[int(np.argmax(np.diff(twist) <= 0))]
+        raise PhysicsError(f"the torsion chain's twist must grow with torque; it does not at {bad:.4g} N m")
+    curve = PchipInterpolator(twist, torque / scale)
+    step = float(twist[-1]) / CELLS
+    nodes = step * np.arange(CELLS + 1)
+    nodes[-1] = twist[-1]
+    return step, quartic_cells(step, curve(nodes), curve.derivative()(nodes))
+
+
+def quartic_cells(step: float, force: Array, stiffness: Array) -> Array:
+    """Cubic Hermite cells of the force whose integral is the energy, so that energy and force agree exactly.
+
+    Args:
+        step: width of a cell.
+        force: values at the nodes, shape (n + 1,).
+        stiffness: slopes at the nodes, shape (n + 1,).
+
+    Returns:
+        Shape (n, 5): F = c0 + c1 s + c2 s^2 + c3 s^3, U = c4 + c0 s + c1 s^2/2 + c2 s^3/3 + c3 s^4/4.
+    """
+    f0, f1, k0, k1 = force[:-1], force[1:], stiffness[:-1], stiffness[1:]
+    c2 = (3 * (f1 - f0) / step - 2 * k0 - k1) / step
+    c3 = (2 * (f0 - f1) / step + k0 + k1) / step**2
+    work = step * (f0 + step * (k0 / 2 + step * (c2 / 3 + step * c3 / 4)))
+    energy = np.concatenate([[0.0], np.cumsum(work)[:-1]])
+    return np.stack([f0, k0, c2, c3, energy], axis=1)

@@ -1,0 +1,262 @@
+"""The teeth of one drive: gaps, pitch errors, contact, engagement, and the structure behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.drive import _mesh, spring
+from hdsim.drive.parameters import ClearanceEngagement, Drive, TabulatedMesh, ToothedMesh, WindowEngagement
+from hdsim.errors import PhysicsError
+
+if TYPE_CHECKING:
+    from hdsim.contact.base import ContactLaw
+
+Array = NDArray[np.float64]
+
+#: Nodes of the gap along a tooth's flank, over half a turn of the wave generator.
+FLANK_CELLS = 64
+#: Angles of the wave generator over which an average over the teeth is taken, within one tooth pitch and beyond.
+PROBES = 24
+
+
+class Teeth:
+    """All teeth of a drive as numbers for the compiled meshes.
+
+    Args:
+        drive: the drive.
+        mesh: its mesh section.
+        wind_ups: springs that effects put in series, torque (N m) to twist (rad) at the output.
+        extra_half_gap_rad: half-gap beyond the surfaces' (wear), rad at the output.
+        seed: seed of surfaces and pitch errors.
+
+    Attributes:
+        parameters: the compiled mesh's numbers.
+        half_gaps_m: shape (teeth,), average half-gap of each tooth, m.
+        pitch_errors_m: shape (teeth,), m.
+        law: contact of one tooth pair, bending included.
+        table_error: for a tabulated mesh, the largest torque error found at points between the nodes, as a
+            share of the rated torque; else None.
+    """
+
+    def __init__(
+        self,
+        drive: Drive,
+        mesh: ToothedMesh,
+        wind_ups: Sequence[Callable[[Array], Array]],
+        *,
+        extra_half_gap_rad: float,
+        seed: int,
+    ) -> None:
+        self.drive = drive
+        self.mesh = mesh
+        geometry = drive.geometry
+        self.count = geometry.flexspline_teeth
+        self.radius_m = geometry.pitch_radius_m
+        self.lever_m = self.radius_m * float(np.cos(np.radians(geometry.pressure_angle_deg)))
+        fixed = drive.arrangement == "circular_spline_fixed"
+        gain = 1.0 if fixed else -geometry.circular_spline_teeth / self.count
+        self.scale = abs(gain)
+        self.rated_tooth_force_n = drive.rated_torque_nm / (mesh.engagement.share * self.count * self.lever_m)
+        self.law = self._law()
+        self.pitch_errors_m = self._pitch_errors(seed)
+        self.table_error: float | None = None
+
+        header = np.zeros(_mesh.HEADER)
+        header[_mesh.TEETH] = self.count
+        header[_mesh.GAIN] = gain
+        header[_mesh.OUTPUT_SHARE] = 0.0 if fixed else 1.0
+        header[_mesh.KAPPA] = 1.0 if fixed else 0.0
+        header[_mesh.INVERSE_RATIO] = 1 / drive.ratio
+        header[_mesh.LEVER] = self.lever_m
+        header[_mesh.LARGEST_PITCH_ERROR] = float(np.max(np.abs(self.pitch_errors_m)))
+        self._blocks: list[Array] = [header]
+        self._length = _mesh.HEADER
+        self._header = header
+        self._place_contact()
+        self._place_gaps(seed)
+        header[_mesh.PITCH_ERROR_AT] = self._place(self.pitch_errors_m)
+        self._place_engagement()
+        self._place_structure(wind_ups)
+        # The wear comes last: the catalogue's stiffness belongs to the new drive.
+        header[_mesh.EXTRA_GAP] = extra_half_gap_rad * self.scale * self.lever_m
+        if isinstance(mesh, TabulatedMesh):
+            self._place_table(mesh)
+        self.parameters = np.concatenate(self._blocks)
+
+    def _place(self, values: Array) -> int:
+        at = self._length
+        self._blocks.append(np.asarray(values, dtype=np.float64).ravel())
+        self._length += values.size
+        return at
+
+    def _law(self) -> ContactLaw:
+        """Contact in series with the bending of the tooth."""
+        from hdsim.contact import SeriesLaw
+
+        law = self.mesh.contact.build(self.mesh.flanks)
+        bending = self.mesh.tooth_bending_stiffness_n_per_m
+        return law if bending is None else SeriesLaw(law, bending)
+
+    def _pitch_errors(self, seed: int) -> Array:
+        errors = np.random.default_rng([seed, 2]).normal(0.0, 1.0, self.count) * self.mesh.pitch_error_m
+        return errors - errors.mean()
+
+    def _place_contact(self) -> None:
+        from hdsim.contact import tabulate
+
+        table = tabulate(self.law, 20 * self.rated_tooth_force_n)
+        header = self._header
+        header[_mesh.CONTACT_STEP] = table.step_m
+        header[_mesh.CONTACT_CELLS] = len(table.coefficients)
+        header[_mesh.CONTACT_AT] = self._place(table.coefficients)
+
+    def _place_gaps(self, seed: int) -> None:
+        """Each tooth's half-gap as cells over the angle from the major axis (one cell: a constant)."""
+        mesh = self.mesh
+        header = self._header
+        if mesh.half_gap_m is not None or not mesh.gap_along_flank:
+            if mesh.half_gap_m is not None:
+                self.half_gaps_m = np.full(self.count, mesh.half_gap_m)
+            else:
+                self.half_gaps_m = mesh.flanks.half_gaps(self.count, seed)
+            cells = np.zeros((self.count, 1, 4))
+            cells[:, 0, 0] = self.half_gaps_m
+        else:
+            from scipy.interpolate import CubicSpline
+
+            nodes = np.linspace(-np.pi / 2, np.pi / 2, FLANK_CELLS + 1)
+            gaps = mesh.flanks.sliding_half_gaps(self.count, FLANK_CELLS + 1, seed)
+            curve = CubicSpline(nodes, gaps, axis=1)
+            cells = np.moveaxis(curve.c[::-1], (0, 1, 2), (2, 1, 0))
+            self.half_gaps_m = gaps.mean(axis=1)
+        header[_mesh.GAP_CELLS] = cells.shape[1]
+        header[_mesh.GAP_AT] = self._place(np.ascontiguousarray(cells))
+
+    def _place_engagement(self) -> None:
+        header = self._header
+        engagement = self.mesh.engagement
+        if isinstance(engagement, WindowEngagement):
+            half = engagement.share * np.pi / 2
+            edge = engagement.edge_teeth * np.pi / self.count
+            if edge > half or half + edge > np.pi / 2:
+                raise PhysicsError(
+                    f"edge_teeth = {engagement.edge_teeth:g} does not fit an arc of {half * self.count / np.pi:.1f} "
+                    f"teeth within half a turn"
+                )
+            header[_mesh.PLATEAU], header[_mesh.BORDER] = half - edge, half + edge
+            return
+        header[_mesh.KIND] = 1.0
+        if engagement.clearance_m is not None:
+            header[_mesh.CLEARANCE] = engagement.clearance_m
+        else:
+            header[_mesh.CLEARANCE] = self._calibrated_clearance(engagement)
+
+    def _calibrated_clearance(self, engagement: ClearanceEngagement) -> float:
+        """Clearance at which the wanted share of teeth touches at rated torque, by bisection."""
+        from scipy.optimize import brentq
+
+        def excess(logarithm: float) -> float:
+            self._header[_mesh.CLEARANCE] = np.exp(logarithm)
+            _, share = self.loaded(self.drive.rated_torque_nm / self.scale)
+            return share - engagement.share
+
+        low, high = np.log(1e-8), np.log(1e-2)
+        if excess(low) < 0 or excess(high) > 0:
+            raise PhysicsError(
+                f"no clearance between 1e-8 and 1e-2 m engages {engagement.share:.0%} of the teeth"
+            )
+        return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
+
+    def torque(self, twist: float) -> tuple[float, float]:
+        """Mean mesh torque at the ring (N m) and engaged share over the wave generator's angle, at a twist (rad)."""
+        parameters = np.concatenate(self._blocks)
+        angles = np.arange(PROBES) * np.pi / PROBES * (1 + 1 / self.count)
+        samples = np.array(
+            [_mesh.teeth_potential(parameters, self.lever_m * twist, angle) for angle in angles]
+        )
+        return float(samples[:, 1].mean() * self.lever_m), float(samples[:, 6].mean() / self.count)
+
+    def loaded(self, torque_nm: float) -> tuple[float, float]:
+        """Mesh twist (rad, at the ring) and engaged share at a mean mesh torque (N m)."""
+        from scipy.optimize import brentq
+
+        high = 1e-5
+        while self.torque(high)[0] < torque_nm:
+            high *= 2
+            if high > 1.0:
+                raise PhysicsError(f"the mesh does not reach {torque_nm:g} N m at a twist of {high:g} rad")
+        twist = float(brentq(lambda angle: self.torque(angle)[0] - torque_nm, 0.0, high, xtol=1e-13))
+        return twist, self.torque(twist)[1]
+
+    def _place_structure(self, wind_ups: Sequence[Callable[[Array], Array]]) -> None:
+        torsion = self.drive.torsion
+        rated = self.drive.rated_torque_nm
+
+        def mesh_wind_up(torque: float) -> float:
+            return self.loaded(torque / self.scale)[0] / self.scale
+
+        self.structure_wind_up = spring.structure_wind_up(torsion, rated, mesh_wind_up)
+        step, cells = spring.spring_cells(
+            [self.structure_wind_up, *wind_ups],
+            [torsion.torque_t1_nm, torsion.torque_t2_nm, rated],
+            spring.TABLE_REACH * rated,
+            scale=self.scale,
+        )
+        header = self._header
+        header[_mesh.SPRING_STEP] = step
+        header[_mesh.SPRING_CELLS] = len(cells)
+        header[_mesh.SPRING_AT] = self._place(cells)
+
+    def _place_table(self, mesh: TabulatedMesh) -> None:
+        """Bicubic spline of the teeth's potential over displacement and angle, and its measured error."""
+        from scipy.interpolate import make_interp_spline
+
+        header = self._header
+        reach = self.lever_m * self.loaded(4 * self.drive.rated_torque_nm / self.scale)[0]
+        exact = np.concatenate(self._blocks)
+        x = np.linspace(-reach, reach, mesh.twist_nodes)
+        step = x[1] - x[0]
+        angles = np.arange(mesh.angle_nodes) * np.pi / mesh.angle_nodes
+        values = np.array([[_mesh.teeth_potential(exact, xi, a)[0] for a in angles] for xi in x])
+        # Uniform B-spline coefficients: periodic in the angle, natural ends in x with one node more each side.
+        spectrum = np.fft.rfft(values, axis=1)
+        k = np.arange(spectrum.shape[1])
+        columns = np.fft.irfft(
+            spectrum / ((2 + np.cos(2 * np.pi * k / mesh.angle_nodes)) / 3), n=mesh.angle_nodes, axis=1
+        )
+        knots = np.concatenate([x[0] + step * np.arange(-3, 0), x, x[-1] + step * np.arange(1, 4)])
+        curve = make_interp_spline(x, columns, k=3, t=knots, bc_type="natural")
+        coefficients = np.ascontiguousarray(curve.c)
+        header[_mesh.TABLE_TWIST_STEP] = step
+        header[_mesh.TABLE_TWIST_START] = x[0]
+        header[_mesh.TABLE_TWIST_NODES] = len(coefficients)
+        header[_mesh.TABLE_ANGLE_NODES] = mesh.angle_nodes
+        header[_mesh.TABLE_AT] = self._place(coefficients)
+        table = np.concatenate(self._blocks)
+        rng = np.random.default_rng(0)
+        points = np.stack([rng.uniform(-reach, reach, 2000), rng.uniform(0, np.pi, 2000)], axis=1)
+        errors = [
+            abs(_mesh.table_potential(table, xi, a)[1] - _mesh.teeth_potential(exact, xi, a)[1])
+            for xi, a in points
+        ]
+        self.table_error = float(max(errors)) * self.lever_m * self.scale / self.drive.rated_torque_nm
+
+    def chain(self) -> dict[str, float]:
+        """Compliance budget at rated torque: share of the wind-up of contact and gap, bending and structure."""
+        rated = self.drive.rated_torque_nm
+        total = float(spring.catalogue_wind_up(self.drive.torsion, np.array(rated)))
+        mesh = self.loaded(rated / self.scale)[0] / self.scale
+        bending = self.mesh.tooth_bending_stiffness_n_per_m
+        bent = 0.0 if bending is None else self.rated_tooth_force_n / bending / self.lever_m / self.scale
+        wave_generator = self.drive.torsion.wave_generator_stiffness_nm_per_rad
+        turned = 0.0 if wave_generator is None else rated / wave_generator
+        return {
+            "contact and gap": (mesh - bent) / total,
+            "tooth bending": bent / total,
+            "wave-generator bearing": turned / total,
+            "cup torsion": (total - mesh - turned) / total,
+        }

@@ -1,0 +1,305 @@
+"""The driver: spans between discontinuities, samples in blocks, the energy audit.
+
+Every span between two corners (of trajectories, loads, controller samples) is one call of
+``scipy.integrate.solve_ivp``. Samples leave in blocks as they are computed, so that a log written on the
+way loses nothing when a run is stopped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.errors import HdsimError
+from hdsim.recording import Column, Event, Recording, Table
+from hdsim.simulation.channels import Observer
+from hdsim.simulation.solvers import Statistics, integrate
+
+if TYPE_CHECKING:
+    from hdsim.drive.model import Model
+
+Array = NDArray[np.float64]
+
+#: Samples of the state table that leave together, and the longest span in samples.
+BLOCK = 4000
+
+
+@dataclass
+class SampledLoop:
+    """A controller that runs at instants and holds its torque in between.
+
+    Args:
+        controller: ``update(t, readings) -> torque`` (``hdsim.actuation``).
+        period_s: time between two instants.
+        place: index of the held torque in the system's reals.
+    """
+
+    controller: Any
+    period_s: float
+    place: int
+
+
+@dataclass
+class Audit:
+    """The energy balance of a run.
+
+    Attributes:
+        residual: largest |stored - start - supplied + delivered + heat|, J.
+        exchanged: energy that went through the drive, J: the largest of the variations of work supplied,
+            work delivered, heat, and of the stored energy.
+    """
+
+    residual: float = 0.0
+    _first: dict[str, float] = field(default_factory=dict)
+    _last: dict[str, float] = field(default_factory=dict)
+    _moved: dict[str, float] = field(default_factory=dict)
+
+    def add(self, table: Table) -> None:
+        """Account for a block of the state table."""
+        self.residual = max(self.residual, float(np.max(np.abs(table["energy_residual"]), initial=0.0)))
+        for name in ("work_supplied", "work_delivered", "heat", "potential_energy", "kinetic_energy"):
+            values = np.concatenate([[self._last.get(name, table[name][0])], table[name]])
+            self._moved[name] = self._moved.get(name, 0.0) + float(np.sum(np.abs(np.diff(values))))
+            self._last[name] = float(values[-1])
+
+    @property
+    def exchanged(self) -> float:
+        """Energy that went through the drive, J."""
+        return max(self._moved.values(), default=0.0)
+
+    @property
+    def relative(self) -> float:
+        """Residual over exchanged energy."""
+        return self.residual / self.exchanged if self.exchanged > 0 else 0.0
+
+
+class RunFailed(HdsimError):  # noqa: N818 - read aloud: "run failed"
+    """The integration stopped before the end; everything up to there was kept."""
+
+
+class Run:
+    """One simulation of a model, sample block by sample block.
+
+    Args:
+        model: the drive with its parts.
+        duration_s: length of the run.
+        sample_rate_hz: rate of the state table.
+        teeth_rate_hz: rate of the teeth table (0: none); at most the sample rate.
+        y0: initial state; the model's own when None.
+        method: name in ``hdsim.simulation.solvers.METHODS``.
+        rtol: relative tolerance; absolute tolerances follow from the states' scales.
+        max_step_s: largest step.
+        reference: side and input column of the reference signal.
+        loop: the sampled controller.
+
+    Attributes:
+        audit: the energy balance so far.
+        statistics: the solver's work so far.
+        events: what happened so far.
+        failure: why the run stopped early, or None.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        duration_s: float,
+        sample_rate_hz: float,
+        teeth_rate_hz: float = 0.0,
+        y0: Array | None = None,
+        method: str = "rodas4",
+        rtol: float = 1e-6,
+        max_step_s: float = math.inf,
+        reference: tuple[str, int] | None = None,
+        loop: SampledLoop | None = None,
+    ) -> None:
+        self.model = model
+        self.duration_s = duration_s
+        self.sample_rate_hz = sample_rate_hz
+        self.teeth_every = max(1, round(sample_rate_hz / teeth_rate_hz)) if teeth_rate_hz > 0 else 0
+        self.method, self.rtol, self.max_step_s = method, rtol, max_step_s
+        self.y0 = model.system.y0.copy() if y0 is None else y0
+        self.loop = loop
+        self.observer = Observer(model, reference)
+        self.audit = Audit()
+        self.statistics = Statistics()
+        self.events: list[Event] = []
+        self.failure: str | None = None
+        self.interrupted: BaseException | None = None
+        self._recent: Table | None = None
+
+    def spans(self) -> Array:
+        """Times at which the integration is cut, from 0 to the duration: shape (spans + 1,)."""
+        cuts = [np.array([0.0, self.duration_s])]
+        cuts += [np.asarray(signal.corners(0.0, self.duration_s)) for signal in self.model.signals]
+        longest = BLOCK / self.sample_rate_hz
+        cuts.append(np.arange(1, math.ceil(self.duration_s / longest)) * longest)
+        if self.loop is not None:
+            cuts.append(
+                np.arange(math.ceil(self.duration_s / self.loop.period_s - 1e-9)) * self.loop.period_s
+            )
+        times = np.unique(np.concatenate(cuts))
+        times = times[(times >= 0.0) & (times <= self.duration_s)]
+        keep = np.concatenate([[True], np.diff(times) > 1e-12 * max(1.0, self.duration_s)])
+        times = times[keep]
+        times[-1] = self.duration_s
+        return times
+
+    def blocks(self, on_time: Callable[[float], object] | None = None) -> Iterator[dict[str, Table]]:
+        """Integrate; yields tables by name as soon as a block of samples is complete.
+
+        Args:
+            on_time: called now and then with the time that has been reached, s.
+        """
+        from hdsim.drive import _assembly as a
+
+        count = math.floor(self.duration_s * self.sample_rate_hz * (1 + 1e-12)) + 1
+        samples = np.arange(count) / self.sample_rate_hz
+        cuts = self.spans()
+        reals = self.model.system.reals
+        y = self.y0
+        step: float | None = None
+        times: list[Array] = []
+        states: list[Array] = []
+        insides: list[Array] = []
+        waiting = 0
+        done = 0
+        for t0, t1 in zip(cuts[:-1], cuts[1:], strict=True):
+            inside = 0.5 * (t0 + t1)
+            reals[a.INSIDE] = inside
+            if self.loop is not None:
+                self._control(t0, y, inside)
+            last = int(np.searchsorted(samples, t1, side="right"))
+            wanted = samples[done:last]
+            found = integrate(
+                self.model.system,
+                t0,
+                t1,
+                y,
+                method=self.method,
+                rtol=self.rtol,
+                t_eval=np.clip(wanted, t0, t1),
+                first_step=step,
+                max_step=self.max_step_s,
+                on_step=None if on_time is None else lambda t, _y: on_time(t),
+            )
+            self.statistics.add(found.statistics)
+            got = found.y.shape[1]
+            if got:
+                times.append(wanted[:got])
+                states.append(found.y.T)
+                insides.append(np.full(got, inside))
+                waiting += got
+            y, step, done = found.y_end, found.next_step, last
+            if on_time is not None:
+                on_time(found.t_end)
+            if not found.success:
+                self._fail(found)
+            if waiting >= BLOCK or (waiting and (self.failure or t1 == cuts[-1])):
+                yield self._block(np.concatenate(times), np.concatenate(states), np.concatenate(insides))
+                times, states, insides, waiting = [], [], [], 0
+            if self.failure:
+                break
+
+    def _control(self, t: float, y: Array, inside: float) -> None:
+        """Let the sampled controller read the sensors and set the held torque."""
+        loop = self.loop
+        assert loop is not None
+        if abs(t / loop.period_s - round(t / loop.period_s)) > 1e-6:
+            return
+        rows = self.observer.samples(np.array([t]), y[None, :], np.array([inside]))
+        now = self.observer.state_table(np.array([t]), y[None, :], rows)
+        self._recent = _extended(self._recent, now, t - self.observer.memory)
+        readings = {name: float(column.values[-1]) for name, column in now.columns.items()}
+        for name, column in self.observer.sensed(self._recent, np.array([t])).items():
+            readings[name.removeprefix("measured_")] = float(column.values[-1])
+        self.model.system.reals[loop.place] = loop.controller.update(t, readings)
+
+    def _block(self, times: Array, states: Array, inside: Array) -> dict[str, Table]:
+        """The tables of a block of samples."""
+        rows = self.observer.samples(times, states, inside)
+        table = self.observer.state_table(times, states, rows)
+        self.audit.add(table)
+        tables = {"state": table}
+        if self.model.sensors:
+            self._history = _extended(getattr(self, "_history", None), table, times[0] - self.observer.memory)
+            table.columns.update(self.observer.sensed(self._history, times))
+        if self.teeth_every and self.model.teeth is not None:
+            chosen = np.round(times * self.sample_rate_hz).astype(int) % self.teeth_every == 0
+            if chosen.any():
+                tables["teeth"] = self.observer.teeth_table(times[chosen], rows[chosen])
+        return tables
+
+    def _fail(self, found: Any) -> None:
+        """Record why the integration stopped."""
+        self.interrupted = found.exception if isinstance(found.exception, KeyboardInterrupt) else None
+        names = self.state_names()
+        worst = names[found.suspect] if found.suspect is not None else None
+        cause = f" The state that fails is {worst}." if worst else ""
+        state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, found.y_end, strict=True))
+        self.failure = f"{found.message}{cause} Last state: {state}."
+        self.events.append(Event(found.t_end, "error", "solver", self.failure))
+
+    def state_names(self) -> list[str]:
+        """Names of the states, in their order in the state vector."""
+        names = [""] * self.model.system.size
+        for name, at in self.model.place_of.items():
+            label = name if name == "motor" else f"{name} less ideal"
+            names[at], names[at + 1] = f"{label} angle (rad)", f"{label} velocity (rad/s)"
+        first = len(names) - 3 - len(self.model.states)
+        for k, state in enumerate(self.model.states):
+            names[first + k] = f"{state.name} ({state.unit})"
+        names[-3:] = ["work supplied (J)", "work delivered (J)", "heat (J)"]
+        return names
+
+    def static(self) -> dict[str, Column]:
+        """What does not change in time: gaps and pitch errors of the teeth."""
+        teeth = self.model.teeth
+        if teeth is None:
+            return {}
+        return {
+            "tooth_half_gap": Column(teeth.half_gaps_m, "m", "average half-gap of each tooth"),
+            "tooth_pitch_error": Column(teeth.pitch_errors_m, "m", "pitch error of each tooth"),
+        }
+
+    def record(self, on_time: Callable[[float], object] | None = None) -> Recording:
+        """Run to the end and keep everything in memory."""
+        parts: dict[str, list[Table]] = {}
+        for tables in self.blocks(on_time):
+            for name, table in tables.items():
+                parts.setdefault(name, []).append(table)
+        return Recording(
+            tables={name: joined(tables) for name, tables in parts.items()},
+            static=self.static(),
+            events=list(self.events),
+        )
+
+
+def joined(tables: list[Table]) -> Table:
+    """Consecutive tables as one."""
+    if len(tables) == 1:
+        return tables[0]
+    first = tables[0]
+    columns = {
+        name: Column(np.concatenate([t[name] for t in tables]), column.unit, column.description)
+        for name, column in first.columns.items()
+    }
+    return Table(np.concatenate([t.time for t in tables]), columns)
+
+
+def _extended(before: Table | None, now: Table, since: float) -> Table:
+    """``before`` and ``now`` as one table without what is older than one sample before ``since`` (s)."""
+    if before is None:
+        return Table(now.time, dict(now.columns))
+    first = max(0, int(np.searchsorted(before.time, since)) - 1)
+    columns = {
+        name: Column(np.concatenate([before[name][first:], column.values]), column.unit, column.description)
+        for name, column in now.columns.items()
+        if name in before
+    }
+    return Table(np.concatenate([before.time[first:], now.time]), columns)
