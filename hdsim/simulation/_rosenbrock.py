@@ -1,0 +1,405 @@
+"""RODAS, compiled once for every model (imports numba: load lazily).
+
+A six-stage, stiffly accurate, L-stable Rosenbrock method of order 4 with an embedded one of order 3 and a
+continuous extension of order 3: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed.,
+Springer 1996, section IV.7 (method, implementation without matrix products, eq. 7.25; coefficients of
+RODAS in the book's code of that name). Step-size control: the same book, section IV.8, eq. 8.25
+(Gustafsson's predictive controller). Initial step: Hairer, Norsett, Wanner, *... I*, 2nd ed., section II.4.
+
+With u = sum gamma_ij k_j a step from (t, y) of size h solves, for i = 1..6,
+
+    (1/(h gamma) - J) u_i = f(t + c_i h, y + sum_j a_ij u_j) + sum_j (c_ij / h) u_j + d_i h df/dt,
+
+one matrix for all stages; y_new = y + sum_j a_6j u_j + u_6, and u_6 is the error estimate.
+
+The model comes in as the address of its system kernel, so nothing here depends on it.
+"""
+
+from __future__ import annotations
+
+from math import isfinite, sqrt
+
+import numpy as np
+from numba import njit
+
+from hdsim._abi import call_system
+
+GAMMA = 0.25
+C2, C3, C4 = 0.386, 0.21, 0.63
+D1, D2, D3, D4 = 0.25, -0.1043, 0.1035, -0.03620000000000023
+A21 = 1.544
+A31, A32 = 0.9466785280815826, 0.2557011698983284
+A41, A42, A43 = 3.314825187068521, 2.896124015972201, 0.9986419139977817
+A51, A52, A53, A54 = 1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950
+C21 = -5.6688
+C31, C32 = -2.430093356833875, -0.2063599157091915
+C41, C42, C43 = -0.1073529058151375, -9.594562251023355, -20.47028614809616
+C51, C52, C53, C54 = 7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160
+C61, C62, C63, C64, C65 = (
+    8.083246795921522,
+    -7.981132988064893,
+    -31.52159432874371,
+    16.31930543123136,
+    -6.058818238834054,
+)
+H21, H22, H23, H24, H25 = (
+    10.12623508344586,
+    -7.487995877610167,
+    -34.80091861555747,
+    -7.992771707568823,
+    1.025137723295662,
+)
+H31, H32, H33, H34, H35 = (
+    -0.6762803392801253,
+    6.087714651680015,
+    16.43084320892478,
+    24.76722511418386,
+    -6.594389125716872,
+)
+
+# Step-size control of the book's code: safety factor, largest shrinking and largest growth of a step.
+_SAFETY = 0.9
+_SHRINK = 5.0
+_GROW = 1.0 / 6.0
+#: After this many non-finite attempts in a row, each with a tenth of the step, there is no way on.
+_HOPELESS = 25
+
+# What ``control`` holds.
+T, T_BOUND, STEP, MAX_STEP, RTOL, LAST_STEP, LAST_ERROR = range(7)
+CONTROL_SIZE = 7
+
+# What ``counts`` holds; the pivots of the LU decomposition follow.
+SIZE, QUADRATURES, DONE, NFEV, NJEV, NLU, ACCEPTED, REJECTED, SUSPECT = range(9)
+COUNTS_SIZE = 9
+
+# What ``advance`` returns.
+RUNNING, FINISHED, STEP_TOO_SMALL, NOT_FINITE = 0, 1, -1, -2
+
+
+def work_size(size: int, quadratures: int) -> int:
+    """Number of float64 of work that ``advance`` needs."""
+    core = size - quadratures
+    return 10 * size + size * size + core * core + core
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _factorise(matrix, inverse, pivots, size):  # type: ignore[no-untyped-def]
+    """LU decomposition in place, partial pivoting; ``inverse`` gets the inverse pivots."""
+    for k in range(size):
+        best, row = abs(matrix[k, k]), k
+        for i in range(k + 1, size):
+            if abs(matrix[i, k]) > best:
+                best, row = abs(matrix[i, k]), i
+        pivots[k] = row
+        if row != k:
+            for j in range(size):
+                matrix[k, j], matrix[row, j] = matrix[row, j], matrix[k, j]
+        inverse[k] = 1.0 / matrix[k, k]
+        for i in range(k + 1, size):
+            factor = matrix[i, k] * inverse[k]
+            matrix[i, k] = factor
+            if factor != 0.0:
+                for j in range(k + 1, size):
+                    matrix[i, j] -= factor * matrix[k, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _solve(matrix, inverse, pivots, core, jacobian, size, step_gamma, b):  # type: ignore[no-untyped-def]
+    """Solve (1/(h gamma) - J) x = b in place: LU for the core, back-substitution for the quadratures."""
+    for k in range(core):
+        row = pivots[k]
+        value = b[row]
+        if row != k:
+            b[row] = b[k]
+            b[k] = value
+    for k in range(1, core):
+        value = b[k]
+        for j in range(k):
+            value -= matrix[k, j] * b[j]
+        b[k] = value
+    for k in range(core - 1, -1, -1):
+        value = b[k]
+        for j in range(k + 1, core):
+            value -= matrix[k, j] * b[j]
+        b[k] = value * inverse[k]
+    for i in range(core, size):
+        value = b[i]
+        for j in range(core):
+            value += jacobian[i, j] * b[j]
+        b[i] = value * step_gamma
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _scaled_norm(values, y, rtol, atol):  # type: ignore[no-untyped-def]
+    """Root mean square of values / (atol + rtol |y|), SciPy's norm."""
+    total = 0.0
+    for i in range(len(y)):
+        ratio = values[i] / (atol[i] + rtol * abs(y[i]))
+        total += ratio * ratio
+    return sqrt(total / len(y))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _initial_step(address, t, y, integers, reals, scratch, f, span, rtol, atol, trial, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
+    """Size of the first step: one explicit Euler step tells the second derivative. ``span`` is signed."""
+    d0, d1 = _scaled_norm(y, y, rtol, atol), _scaled_norm(f, y, rtol, atol)
+    guess = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    guess = min(guess, abs(span))
+    h = guess if span > 0.0 else -guess
+    for i in range(len(y)):
+        trial[i] = y[i] + h * f[i]
+    call_system(address, t + h, trial, integers, reals, scratch, 0, dy, jacobian, dfdt)
+    for i in range(len(y)):
+        trial[i] = dy[i] - f[i]
+    d2 = _scaled_norm(trial, y, rtol, atol) / guess
+    largest = max(d1, d2)
+    chosen = max(1e-6, guess * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** 0.25
+    chosen = min(100.0 * guess, chosen)
+    return chosen if isfinite(chosen) else guess
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _first_not_finite(values):  # type: ignore[no-untyped-def]
+    """Index of the first non-finite value, -1 if there is none."""
+    for i in range(len(values)):
+        if not isfinite(values[i]):
+            return i
+    return -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def advance(address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces):  # type: ignore[no-untyped-def]
+    """Take up to ``len(pieces)`` accepted steps, stopping exactly at ``control[T_BOUND]``.
+
+    Args:
+        address: of the system kernel; ``integers``, ``reals`` and ``scratch`` are its own.
+        integers: see ``hdsim.simulation.system.System``.
+        reals: likewise.
+        scratch: likewise.
+        y: state, shape (n,); updated.
+        atol: absolute tolerance, shape (n,).
+        control: shape (CONTROL_SIZE,); updated. ``control[STEP]`` is the size of the step to try (0: choose
+            one), ``control[LAST_STEP]`` 0 before the first step.
+        counts: shape (COUNTS_SIZE + n,), int64; updated. ``counts[DONE]`` is the number of steps taken here.
+        work: shape (work_size(n, quadratures),).
+        times: shape (k + 1,); gets the ends of the steps.
+        states: shape (k + 1, n); gets the states there.
+        pieces: shape (k, 2, n); gets the rest of the continuous extension.
+
+    Returns:
+        RUNNING, FINISHED, STEP_TOO_SMALL or NOT_FINITE; ``counts[SUSPECT]`` then names the state.
+    """
+    n, core = counts[SIZE], counts[SIZE] - counts[QUADRATURES]
+    pivots = counts[COUNTS_SIZE:]
+    f, dfdt, dy, new = work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n : 4 * n]
+    u1, u2, u3 = work[4 * n : 5 * n], work[5 * n : 6 * n], work[6 * n : 7 * n]
+    u4, u5, u6 = work[7 * n : 8 * n], work[8 * n : 9 * n], work[9 * n : 10 * n]
+    start = 10 * n
+    jacobian = work[start : start + n * n].reshape(n, n)
+    start += n * n
+    matrix = work[start : start + core * core].reshape(core, core)
+    start += core * core
+    inverse = work[start : start + core]
+
+    t, t_bound, rtol = control[T], control[T_BOUND], control[RTOL]
+    direction = 1.0 if t_bound >= t else -1.0
+    times[0] = t
+    for i in range(n):
+        states[0, i] = y[i]
+    counts[DONE] = 0
+
+    while counts[DONE] < len(pieces):
+        call_system(address, t, y, integers, reals, scratch, 1, f, jacobian, dfdt)
+        counts[NFEV] += 1
+        counts[NJEV] += 1
+        if control[STEP] == 0.0:
+            control[STEP] = _initial_step(
+                address, t, y, integers, reals, scratch, f, t_bound - t, rtol, atol, new, dy, jacobian, u1
+            )
+            counts[NFEV] += 1
+        smallest = 10.0 * abs(np.nextafter(t, direction * np.inf) - t)
+        size = min(max(control[STEP], smallest), control[MAX_STEP])
+        rejected, hopeless, accepted = False, 0, False
+
+        while not accepted:
+            proposed, truncated, last = size, False, False
+            rest = abs(t_bound - t)
+            if rest <= 1.0001 * size:
+                size, truncated, last = rest, True, True
+            elif rest < 2.0 * size:  # two equal steps rather than one and a crumb
+                size, truncated = 0.5 * rest, True
+            h = direction * size
+            t_new = t_bound if last else t + h
+
+            diagonal = 1.0 / (h * GAMMA)
+            for i in range(core):
+                for j in range(core):
+                    matrix[i, j] = -jacobian[i, j]
+                matrix[i, i] += diagonal
+            _factorise(matrix, inverse, pivots, core)
+            counts[NLU] += 1
+            step_gamma = h * GAMMA
+            p = 1.0 / h
+
+            s1 = h * D1
+            for i in range(n):
+                u1[i] = f[i] + s1 * dfdt[i]
+            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u1)
+
+            for i in range(n):
+                new[i] = y[i] + A21 * u1[i]
+            call_system(address, t + C2 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2 = p * C21, h * D2
+            for i in range(n):
+                u2[i] = dy[i] + s1 * u1[i] + s2 * dfdt[i]
+            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u2)
+
+            for i in range(n):
+                new[i] = y[i] + A31 * u1[i] + A32 * u2[i]
+            call_system(address, t + C3 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2, s3 = p * C31, p * C32, h * D3
+            for i in range(n):
+                u3[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * dfdt[i]
+            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u3)
+
+            for i in range(n):
+                new[i] = y[i] + A41 * u1[i] + A42 * u2[i] + A43 * u3[i]
+            call_system(address, t + C4 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2, s3, s4 = p * C41, p * C42, p * C43, h * D4
+            for i in range(n):
+                u4[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * dfdt[i]
+            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u4)
+
+            for i in range(n):
+                new[i] = y[i] + A51 * u1[i] + A52 * u2[i] + A53 * u3[i] + A54 * u4[i]
+            call_system(address, t_new, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2, s3, s4 = p * C51, p * C52, p * C53, p * C54
+            for i in range(n):
+                u5[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * u4[i]
+            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u5)
+
+            for i in range(n):
+                new[i] += u5[i]
+            call_system(address, t_new, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2, s3, s4, s5 = p * C61, p * C62, p * C63, p * C64, p * C65
+            for i in range(n):
+                u6[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * u4[i] + s5 * u5[i]
+            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u6)
+
+            total = 0.0
+            for i in range(n):
+                new[i] += u6[i]
+                ratio = u6[i] / (atol[i] + rtol * max(abs(y[i]), abs(new[i])))
+                total += ratio * ratio
+            error = sqrt(total / n)
+            counts[NFEV] += 5
+
+            if not isfinite(error):
+                counts[REJECTED] += 1
+                hopeless += 1
+                # The first state with a bad number, at the step's start if it is already bad there.
+                bad = _first_not_finite(f)
+                for i in range(n):
+                    if bad < 0 and (not isfinite(dfdt[i]) or _first_not_finite(jacobian[i]) >= 0):
+                        bad = i
+                at_start = bad >= 0
+                if bad < 0:
+                    bad = _first_not_finite(dy)
+                if bad < 0:
+                    bad = _first_not_finite(new)
+                counts[SUSPECT] = bad
+                size *= 0.1
+                if at_start or hopeless > _HOPELESS or size < smallest:
+                    return NOT_FINITE
+                rejected = True
+                continue
+
+            factor = max(_GROW, min(_SHRINK, sqrt(sqrt(error)) / _SAFETY))
+            if error >= 1.0:
+                counts[REJECTED] += 1
+                rejected = True
+                size /= factor
+                if size < smallest:
+                    worst = -1.0
+                    for i in range(n):
+                        ratio = abs(u6[i]) / (atol[i] + rtol * max(abs(y[i]), abs(new[i])))
+                        if ratio > worst:
+                            worst = ratio
+                            counts[SUSPECT] = i
+                    return STEP_TOO_SMALL
+                continue
+
+            accepted = True
+            best = proposed if error == 0.0 else min(proposed, size * _SAFETY / sqrt(sqrt(error)))
+            if control[LAST_STEP] > 0.0:
+                predicted = control[LAST_STEP] / size * sqrt(sqrt(error * error / control[LAST_ERROR]))
+                factor = max(factor, max(_GROW, min(_SHRINK, predicted / _SAFETY)))
+            following = size / factor
+            if rejected:
+                following = min(following, size)
+            elif truncated:  # the end of the span, not the error, made this step short
+                following = max(following, best)
+            control[LAST_STEP] = size
+            control[LAST_ERROR] = max(1e-2, error)
+            control[STEP] = min(following, control[MAX_STEP])
+
+        k = counts[DONE]
+        for i in range(n):
+            y[i] = new[i]
+            states[k + 1, i] = new[i]
+            pieces[k, 0, i] = H21 * u1[i] + H22 * u2[i] + H23 * u3[i] + H24 * u4[i] + H25 * u5[i]
+            pieces[k, 1, i] = H31 * u1[i] + H32 * u2[i] + H33 * u3[i] + H34 * u4[i] + H35 * u5[i]
+        t = t_new
+        times[k + 1] = t
+        control[T] = t
+        counts[DONE] += 1
+        counts[ACCEPTED] += 1
+        if last:
+            return FINISHED
+    return RUNNING
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def interpolate(times, states, pieces, count, t, out):  # type: ignore[no-untyped-def]
+    """Evaluate the continuous extension (the book's eq. 7.28) of ``count`` steps at ``t`` (m,) into ``out`` (n, m).
+
+    Outside the steps the first or last piece is continued.
+    """
+    forward = times[count] >= times[0]
+    for j in range(len(t)):
+        low, high = 0, count - 1
+        while low < high:
+            middle = (low + high) // 2
+            if (t[j] <= times[middle + 1]) if forward else (t[j] >= times[middle + 1]):
+                high = middle
+            else:
+                low = middle + 1
+        s = (t[j] - times[low]) / (times[low + 1] - times[low])
+        r = 1.0 - s
+        for i in range(states.shape[1]):
+            out[i, j] = states[low, i] * r + s * (
+                states[low + 1, i] + r * (pieces[low, 0, i] + s * pieces[low, 1, i])
+            )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def run(  # type: ignore[no-untyped-def]
+    address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces, t_eval, out
+):
+    """Integrate to the bound in one compiled loop, sampling at increasing ``t_eval`` (m,) into ``out`` (n, m).
+
+    Returns the last status of ``advance``.
+    """
+    sampled = 0
+    status = RUNNING
+    while status == RUNNING:
+        status = advance(
+            address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces
+        )
+        end = sampled
+        while end < len(t_eval) and t_eval[end] <= control[T]:
+            end += 1
+        if end > sampled and counts[DONE] > 0:
+            interpolate(times, states, pieces, counts[DONE], t_eval[sampled:end], out[:, sampled:end])
+            sampled = end
+    return status

@@ -1,0 +1,235 @@
+"""The default method: RODAS in compiled blocks of steps, as a SciPy ``OdeSolver`` (imports SciPy and numba).
+
+The method and its sources are in ``hdsim.simulation._rosenbrock``; ``docs/integration.md`` says when to use it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DenseOutput, OdeSolver
+
+from hdsim.simulation import _rosenbrock as compiled
+from hdsim.simulation.system import System
+
+Array = NDArray[np.float64]
+
+_CAUSES = {
+    compiled.STEP_TOO_SMALL: OdeSolver.TOO_SMALL_STEP,
+    compiled.NOT_FINITE: "The right-hand side or its Jacobian is not finite.",
+}
+
+
+class _Block:
+    """The arrays that the compiled loop works on, for one run of one system."""
+
+    def __init__(
+        self,
+        system: System,
+        t0: float,
+        y0: Array,
+        t_bound: float,
+        rtol: float,
+        atol: float | Array,
+        first_step: float | None,
+        max_step: float,
+        steps: int,
+    ) -> None:
+        n = system.size
+        self.steps = steps
+        self.y = np.array(y0, dtype=np.float64)
+        self.atol = np.empty(n)
+        self.atol[:] = atol
+        if not (rtol >= 0.0 and min(self.atol.tolist(), default=1.0) >= 0.0):
+            raise ValueError("`rtol` and `atol` must not be negative.")
+        self.control = np.array([t0, t_bound, first_step or 0.0, max_step, rtol, 0.0, 0.0])
+        self.counts = np.zeros(compiled.COUNTS_SIZE + n, dtype=np.int64)
+        self.counts[compiled.SIZE] = n
+        self.counts[compiled.QUADRATURES] = system.quadratures
+        self._kernel = (
+            system.kernel.address,
+            system.integers,
+            system.reals,
+            np.zeros(max(1, system.scratch_size)),
+        )
+        self._work = np.empty(compiled.work_size(n, system.quadratures))
+        self.renew()
+
+    def renew(self) -> None:
+        """Take new arrays for the steps; the old ones now belong to somebody else."""
+        n, k = len(self.y), self.steps
+        self.record = np.empty(k + 1), np.empty((k + 1, n)), np.empty((k, 2, n))
+
+    def advance(self) -> int:
+        """Take up to ``steps`` steps; see ``_rosenbrock.advance``."""
+        return int(
+            compiled.advance(*self._kernel, self.y, self.atol, self.control, self.counts, self._work, *self.record)
+        )
+
+    def run(self, t_eval: Array) -> tuple[int, Array]:
+        """Integrate to the bound and sample at increasing ``t_eval``; see ``_rosenbrock.run``."""
+        out = np.full((len(self.y), len(t_eval)), np.nan)
+        status = compiled.run(
+            *self._kernel,
+            self.y,
+            self.atol,
+            self.control,
+            self.counts,
+            self._work,
+            *self.record,
+            t_eval,
+            out,
+        )
+        return int(status), out
+
+
+class Rodas4(OdeSolver):  # type: ignore[misc]
+    """RODAS (Hairer & Wanner 1996, IV.7): Rosenbrock method of order 4(3), L-stable, for stiff and smooth systems.
+
+    Use it as ``solve_ivp(system.rhs, (t0, t1), y0, method=Rodas4, system=system)``. One call of ``step`` takes
+    up to ``steps_per_call`` accepted steps; ``t_old`` and ``t`` are then the ends of that block, and
+    ``dense_output`` spans it. ``solve_ivp`` looks for events, and without ``t_eval`` returns points, at the ends
+    of blocks only: with events set ``steps_per_call=1``, which is stock behaviour.
+
+    A failing step leaves what the block did before it: that is delivered first, the next ``step`` fails.
+
+    Args:
+        fun: ignored but for the interface; the kernel of ``system`` is called instead.
+        t0: start.
+        y0: initial state, shape (n,).
+        t_bound: end; may lie before the start.
+        vectorized: ignored.
+        system: the compiled system.
+        rtol: relative tolerance.
+        atol: absolute tolerance, a number or shape (n,).
+        first_step: size of the first step; chosen when None.
+        max_step: largest step.
+        steps_per_call: accepted steps in one block.
+
+    Attributes:
+        steps: number of accepted steps.
+        rejected: number of rejected steps.
+        suspect: after a failure, index of the state that caused it; else None.
+
+    Raises:
+        ValueError: an argument is out of its range.
+    """
+
+    steps = 0
+    rejected = 0
+    suspect: int | None = None
+
+    def __init__(
+        self,
+        fun: Any,
+        t0: float,
+        y0: Array,
+        t_bound: float,
+        vectorized: bool = False,
+        *,
+        system: System,
+        rtol: float = 1e-3,
+        atol: float | Array = 1e-6,
+        first_step: float | None = None,
+        max_step: float = np.inf,
+        steps_per_call: int = 64,
+    ) -> None:
+        super().__init__(fun, t0, y0, t_bound, vectorized)
+        if self.n != system.size:
+            raise ValueError(f"`y0` has {self.n} states, the system {system.size}.")
+        if not max_step > 0.0:
+            raise ValueError("`max_step` must be positive.")
+        if first_step is not None and not 0.0 < first_step <= abs(t_bound - t0):
+            raise ValueError("`first_step` must be positive and within the bounds.")
+        if steps_per_call < 1:
+            raise ValueError("`steps_per_call` must be at least 1.")
+        self._block = _Block(system, t0, self.y, t_bound, rtol, atol, first_step, max_step, steps_per_call)
+        self._failure: int | None = None
+        self._handed_over = False
+
+    @property
+    def next_step(self) -> float:
+        """Size of the step that would be tried next, not cut by ``t_bound``; 0 before the first."""
+        return float(self._block.control[compiled.STEP])
+
+    def _step_impl(self) -> tuple[bool, str | None]:
+        """Take a block of steps."""
+        block = self._block
+        done = 0
+        if self._failure is None:
+            if self._handed_over:
+                block.renew()
+                self._handed_over = False
+            status = block.advance()
+            done, self.nfev, self.njev, self.nlu, self.steps, self.rejected = block.counts[
+                compiled.DONE : compiled.REJECTED + 1
+            ].tolist()
+            if status < 0:
+                self._failure = status
+        if done == 0 and self._failure is not None:
+            self.suspect = int(block.counts[compiled.SUSPECT])
+            return False, _CAUSES[self._failure]
+        self.t = float(block.control[compiled.T])
+        self.y = block.y.copy()
+        self._done = done
+        return True, None
+
+    def _dense_output_impl(self) -> BlockDenseOutput:
+        """Continuous extension over the last block."""
+        self._handed_over = True
+        return BlockDenseOutput(self.t_old, self.t, self._block.record, self._done)
+
+
+class BlockDenseOutput(DenseOutput):  # type: ignore[misc]
+    """Continuous extension of RODAS, of order 3, over the steps of one block."""
+
+    def __init__(self, t_old: float, t: float, record: tuple[Array, Array, Array], count: int) -> None:
+        super().__init__(t_old, t)
+        self._record, self._count = record, count
+
+    def _call_impl(self, t: Array) -> Array:
+        """Values at t: shape (n,) for a number, (n, m) for shape (m,)."""
+        points = np.ascontiguousarray(t, dtype=np.float64).reshape(-1)
+        out = np.empty((self._record[1].shape[1], len(points)))
+        compiled.interpolate(*self._record, self._count, points, out)
+        return out[:, 0] if np.ndim(t) == 0 else out
+
+
+def bare_rodas4(
+    system: System,
+    t0: float,
+    t1: float,
+    y0: Array,
+    t_eval: Array,
+    *,
+    rtol: float,
+    atol: float | Array,
+    first_step: float | None = None,
+    max_step: float = np.inf,
+) -> tuple[Array, Array, int]:
+    """Integrate forward in one compiled loop without SciPy: the yardstick for what SciPy's loop costs.
+
+    Args:
+        system: the compiled system.
+        t0: start.
+        t1: end, after the start.
+        y0: initial state, shape (n,).
+        t_eval: increasing times to sample at, shape (m,), within the bounds.
+        rtol: relative tolerance.
+        atol: absolute tolerance, a number or shape (n,).
+        first_step: size of the first step; chosen when None.
+        max_step: largest step.
+
+    Returns:
+        Samples (n, m), final state (n,) and number of accepted steps.
+
+    Raises:
+        ArithmeticError: the integration failed.
+    """
+    block = _Block(system, t0, y0, t1, rtol, atol, first_step, max_step, 64)
+    status, samples = block.run(np.ascontiguousarray(t_eval, dtype=np.float64))
+    if status < 0:
+        raise ArithmeticError(f"{_CAUSES[status]} t = {block.control[compiled.T]}")
+    return samples, block.y, int(block.counts[compiled.ACCEPTED])
