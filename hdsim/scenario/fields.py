@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import types
 from collections.abc import Mapping, Sequence
 from enum import Enum
@@ -167,7 +168,8 @@ def words(shape: Shape, *, with_description: bool = True) -> str:
     unit = split_unit(shape.name)[1]
     description = " ".join(shape.description.split())
     sentence = description.split(". ")[0].rstrip(".")
-    if unit and (not with_description or unit not in sentence):
+    said = with_description and re.search(rf"(?<!\w){re.escape(unit)}(?!\w)", sentence)
+    if unit and not said:
         text += f" in {unit}"
     if with_description and sentence:
         text += f" ({sentence if len(sentence) <= 110 else sentence[:107] + '...'})"

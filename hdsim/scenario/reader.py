@@ -160,10 +160,9 @@ def _syntax_error(error: YAMLError, text: str, file: str) -> ScenarioError:
     if "mapping values are not allowed" in problem:
         complaint = "a ':' where no key can stand (wrong indentation, or text with ': ' that needs quotes)"
     elif "end of stream" in problem or "stream end" in problem:
-        begun = getattr(error, "context_mark", None)
-        complaint = "the end of the file inside something not closed" + (
-            f" (begun in line {begun.line + 1})" if begun else ""
-        )
+        begun = getattr(error, "context_mark", None) or mark
+        number = begun.line if begun else number
+        complaint = "something that begins here and is not closed before the end of the file"
     elif "cannot start any token" in problem:
         complaint = problem.removeprefix("found ").replace("'\\t'", "tab") + " (put text with it in quotes)"
     else:
@@ -181,7 +180,8 @@ def _build(text: str, file: str) -> Node:
     documents = 0
     for event in _events(text, file):
         mark = Mark(file, event.start_mark.line + 1)
-        path = tuple(key for level in stack if (key := level.key_of_next()) is not None)
+        top = stack[-1] if stack else None
+        path = top.path_of_next() if top is not None else ()
         if isinstance(event, events.DocumentStartEvent):
             documents += 1
             if documents > 1:
@@ -201,7 +201,6 @@ def _build(text: str, file: str) -> Node:
         tag = getattr(event, "tag", None)
         if tag is not None:
             raise fail(mark, f"found the tag {shorten(ascii(tag)[1:-1])}, expected a value without tag", path)
-        top = stack[-1] if stack else None
         if top is not None and top.awaits_key:
             top.set_key(event, mark, path)
             continue
@@ -217,7 +216,7 @@ def _build(text: str, file: str) -> Node:
             top.add(node)
         if not isinstance(node.value, dict | list):
             continue
-        stack.append(_Open(node))
+        stack.append(_Open(node, path))
     if root is None or root.value is None:
         raise fail(Mark(file, 1), "found an empty file, expected a mapping of 'key: value' lines")
     if not isinstance(root.value, dict):
@@ -229,8 +228,9 @@ def _build(text: str, file: str) -> Node:
 class _Open:
     """A mapping or list whose end has not been read."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, path: KeyPath) -> None:
         self.node = node
+        self.path = path
         self.key: str | None = None
         self.key_mark = node.mark
 
@@ -238,8 +238,10 @@ class _Open:
     def awaits_key(self) -> bool:
         return isinstance(self.node.value, dict) and self.key is None
 
-    def key_of_next(self) -> Key | None:
-        return self.key if isinstance(self.node.value, dict) else len(self.node.value)
+    def path_of_next(self) -> KeyPath:
+        if isinstance(self.node.value, list):
+            return (*self.path, len(self.node.value))
+        return self.path if self.key is None else (*self.path, self.key)
 
     def set_key(self, event: Any, mark: Mark, path: KeyPath) -> None:
         from ruamel.yaml.events import ScalarEvent
@@ -271,21 +273,24 @@ def _scalar(event: Any, mark: Mark, path: KeyPath) -> str | int | float | bool |
     text: str = event.value
     if event.style is not None:
         return text
+    if _NOT_FINITE.fullmatch(text):
+        raise fail(mark, f"found {text}, expected a finite number", path)
+    if _INT.fullmatch(text) and len(text) > 300:
+        raise fail(mark, f"found a number of {len(text)} digits, expected one of reasonable length", path)
+    value = resolve(text)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise fail(mark, f"found {shorten(text)}, which overflows, expected a finite number", path)
+    return value
+
+
+def resolve(text: str) -> str | int | float | bool | None:
+    """Value of a scalar without quotes, by YAML 1.2.2's core schema (table of section 10.3.2)."""
     if _NULL.fullmatch(text):
         return None
     if _BOOL.fullmatch(text):
         return text[0] in "tT"
-    if _NOT_FINITE.fullmatch(text):
-        raise fail(mark, f"found {text}, expected a finite number", path)
     if _INT.fullmatch(text):
-        if len(text) > 300:
-            raise fail(mark, f"found a number of {len(text)} digits, expected one of reasonable length", path)
         return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
-    if _FLOAT.fullmatch(text):
-        number = float(text)
-        if not math.isfinite(number):
-            raise fail(
-                mark, f"found {shorten(text)}, beyond the largest number, expected a finite number", path
-            )
-        return number
+    if _FLOAT.fullmatch(text) or _NOT_FINITE.fullmatch(text):
+        return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
     return text

@@ -36,7 +36,7 @@ def json_schema(model: type[BaseModel]) -> Schema:
     extends = {
         "type": "string",
         "title": "Extends",
-        "description": "Path, relative to this file, of a scenario from which everything not given here is taken.",
+        "description": "Path, relative to this file, of a scenario that gives what this one leaves out.",
     }
     partial[f"{name}.partial"]["properties"]["extends"] = extends
     return {

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from hdsim.parts import Parameters
 
 #: Integration methods, by name: hdsim's own and those of ``scipy.integrate.solve_ivp``.
-Method = Literal["hdsim", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
+Method = Literal["rodas4", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 
 
 class Start(Parameters):
@@ -28,7 +28,7 @@ class Run(Parameters):
 
     duration_s: float = Field(gt=0, le=1e6)
     """Simulated time, s."""
-    method: Method = "hdsim"
+    method: Method = "rodas4"
     """Integration method: hdsim's own (the fast one), or one of SciPy's by its name."""
     rtol: float = Field(1e-6, gt=1e-14, le=1e-2)
     """Relative tolerance of the integration."""
