@@ -1,1 +1,46 @@
+"""Rough tooth flanks: Weierstrass-Mandelbrot profiles, equivalent surface of two flanks, backlash.
 
+The names below are loaded when they are first used, so that reading the parameter models stays light.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hdsim.surface.backlash import single_frequency_half_gap, sliding_half_gaps, tooth_half_gaps
+    from hdsim.surface.flank import Flank, equivalent_surface, structure_function, structure_function_constant
+    from hdsim.surface.profile import random_phases, wm_profile
+
+_HOME = {
+    "Flank": "flank",
+    "equivalent_surface": "flank",
+    "structure_function": "flank",
+    "structure_function_constant": "flank",
+    "random_phases": "profile",
+    "wm_profile": "profile",
+    "single_frequency_half_gap": "backlash",
+    "sliding_half_gaps": "backlash",
+    "tooth_half_gaps": "backlash",
+}
+
+__all__ = [
+    "Flank",
+    "equivalent_surface",
+    "random_phases",
+    "single_frequency_half_gap",
+    "sliding_half_gaps",
+    "structure_function",
+    "structure_function_constant",
+    "tooth_half_gaps",
+    "wm_profile",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from the module that defines it."""
+    from importlib import import_module
+
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
