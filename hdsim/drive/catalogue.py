@@ -108,7 +108,7 @@ INERTIA_COMPONENT = Source(
     "copied",
 )
 GEAR_DB = Source(
-    "Harmonic Drive CSG and SHG (same ratings) data; copied, naming no document, in a public robot model's gear_db",
+    "Harmonic Drive CSG and SHG (same ratings) data; copied, naming no document, in a robot model's gear_db",
     "copied",
 )
 PRODUCT_PAGE = Source(
@@ -147,8 +147,8 @@ _INERTIA = {
 _RADIUS_MM = {14: 17.78, 17: 21.59, 20: 25.40, 25: 31.75}
 
 # Rated, average, repeated peak, momentary peak torque in N m, each with its source. Where the copied gear_db
-# contradicts itself or the catalogue as quoted, the value that fits the quoted one is taken: momentary peaks of
-# 17-50 (127 there, which is size 20), 17-100 (109 for CSG, 143 for SHG) and 17-120 (143 for SHG), average
+# contradicts itself or the catalogue as quoted, the value that fits the quoted one is taken: momentary peaks
+# of 17-50 (127 there, which is size 20), 17-100 (109 for CSG, 143 for SHG) and 17-120 (143 for SHG), average
 # torque of 17-80 (38 for CSG, 39.93 for SHG), peaks of 14-100 (the same as 14-80 there).
 _P, _C, _R, _Q = PRODUCT_PAGE, GEAR_DB, PROJECT, QUOTED
 _RATINGS: dict[tuple[int, int], tuple[tuple[float, Source], ...]] = {

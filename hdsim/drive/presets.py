@@ -50,8 +50,9 @@ def _size_and_ratio(name: str) -> tuple[int, int]:
     known: dict[str, tuple[int, int]] = {_SEED_NAME: (20, 100)}
     known |= {f"csg-{size}-{ratio}": (size, ratio) for size, ratio in SIZES_AND_RATIOS}
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
+        begun = [other for other in known if name and other.startswith(name)]
+        near = begun or difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
         raise ValueError(f"unknown preset {name!r}; {hint}known are {', '.join(known)}")
     return known[name]
 
