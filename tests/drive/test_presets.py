@@ -234,7 +234,7 @@ def test_every_figure_has_a_citation_and_a_confidence():
 def test_unknown_name_lists_the_known_and_the_nearest():
     with pytest.raises(ValueError, match=r"'seed-2012'; did you mean 'seed-2021'\?.*csg-20-100"):
         preset("seed-2012")
-    with pytest.raises(ValueError, match="did you mean 'csg-14-50' or 'csg-14-80' or 'csg-14-100'?"):
+    with pytest.raises(ValueError, match=r"did you mean 'csg-14-50' or 'csg-14-80' or 'csg-14-100'\?"):
         preset("csg-14")
     with pytest.raises(ValueError, match="known are seed-2021"):
         catalogue_figures("%")
