@@ -65,7 +65,9 @@ class _Block:
     def advance(self) -> int:
         """Take up to ``steps`` steps; see ``_rosenbrock.advance``."""
         return int(
-            compiled.advance(*self._kernel, self.y, self.atol, self.control, self.counts, self._work, *self.record)
+            compiled.advance(
+                *self._kernel, self.y, self.atol, self.control, self.counts, self._work, *self.record
+            )
         )
 
     def run(self, t_eval: Array) -> tuple[int, Array]:
@@ -104,7 +106,8 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
         system: the compiled system.
         rtol: relative tolerance.
         atol: absolute tolerance, a number or shape (n,).
-        first_step: size of the first step; chosen when None.
+        first_step: size of the first step; chosen when None. Longer than the span is allowed, and remembered in
+            ``next_step``: spans between discontinuities can be shorter than a step.
         max_step: largest step.
         steps_per_call: accepted steps in one block.
 
@@ -141,8 +144,8 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
             raise ValueError(f"`y0` has {self.n} states, the system {system.size}.")
         if not max_step > 0.0:
             raise ValueError("`max_step` must be positive.")
-        if first_step is not None and not 0.0 < first_step <= abs(t_bound - t0):
-            raise ValueError("`first_step` must be positive and within the bounds.")
+        if first_step is not None and not first_step > 0.0:
+            raise ValueError("`first_step` must be positive.")
         if steps_per_call < 1:
             raise ValueError("`steps_per_call` must be at least 1.")
         self._block = _Block(system, t0, self.y, t_bound, rtol, atol, first_step, max_step, steps_per_call)
@@ -169,7 +172,8 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
             if status < 0:
                 self._failure = status
         if done == 0 and self._failure is not None:
-            self.suspect = int(block.counts[compiled.SUSPECT])
+            suspect = int(block.counts[compiled.SUSPECT])
+            self.suspect = suspect if suspect >= 0 else None
             return False, _CAUSES[self._failure]
         self.t = float(block.control[compiled.T])
         self.y = block.y.copy()

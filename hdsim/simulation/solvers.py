@@ -30,6 +30,7 @@ class Method:
         module: where its ``OdeSolver`` class lives; imported on first use.
         class_name: name of that class.
         jacobian: whether it takes the Jacobian as the option ``jac``.
+        one_step: whether it starts afresh at each step, so that the last step size of a span suits the next one.
         compiled: whether it calls the system's kernel itself, by the option ``system``.
         summary: one line for the user.
     """
@@ -37,22 +38,33 @@ class Method:
     module: str
     class_name: str
     jacobian: bool
+    one_step: bool
     compiled: bool
     summary: str
 
 
-_SCIPY = "scipy.integrate"
+def _stock(name: str, jacobian: bool, one_step: bool, summary: str) -> Method:
+    """One of SciPy's own methods."""
+    return Method("scipy.integrate", name, jacobian, one_step, compiled=False, summary=summary)
+
 
 #: The methods by name; the first is the default.
 METHODS: dict[str, Method] = {
     "rodas4": Method(
-        "hdsim.simulation.rosenbrock", "Rodas4", False, True, "Rosenbrock, order 4, L-stable, compiled; the default"
+        "hdsim.simulation.rosenbrock",
+        "Rodas4",
+        jacobian=False,
+        one_step=True,
+        compiled=True,
+        summary="Rosenbrock, order 4, L-stable, compiled; the default",
     ),
-    "RK45": Method(_SCIPY, "RK45", False, False, "explicit Runge-Kutta of order 5; not for stiff models"),
-    "DOP853": Method(_SCIPY, "DOP853", False, False, "explicit Runge-Kutta of order 8; smooth, not stiff, tight"),
-    "Radau": Method(_SCIPY, "Radau", True, False, "implicit Runge-Kutta of order 5; stiff"),
-    "BDF": Method(_SCIPY, "BDF", True, False, "multistep of orders 1 to 5; stiff, few accurate digits"),
-    "LSODA": Method(_SCIPY, "LSODA", True, False, "Adams and BDF with switching; ODEPACK"),
+    "RK45": _stock("RK45", False, True, "explicit Runge-Kutta of order 5; not for stiff models"),
+    "DOP853": _stock(
+        "DOP853", False, True, "explicit Runge-Kutta of order 8; smooth, not stiff, tight tolerances"
+    ),
+    "Radau": _stock("Radau", True, True, "implicit Runge-Kutta of order 5; stiff"),
+    "BDF": _stock("BDF", True, False, "multistep of orders 1 to 5; stiff, few accurate digits"),
+    "LSODA": _stock("LSODA", True, False, "Adams and BDF with switching, from ODEPACK"),
 }
 
 #: A stock method that sees this many non-finite right-hand sides in a row is stopped: some never give up.
@@ -90,7 +102,7 @@ class Integration:
         y: samples, shape (n, m).
         t_end: the time that was reached.
         y_end: state at ``t_end``, shape (n,).
-        next_step: size of the step to start the next span with; None when unknown.
+        next_step: size of the step to start the next span with; None for a method that had better choose.
         success: whether ``t_end`` is the end that was asked for.
         message: why not; ends with the time. Empty on success.
         statistics: work done.
@@ -118,7 +130,7 @@ class _Watch:
         self.t, self.y = t, y
         self.on_step = on_step
         self.calls = 0
-        self.next_step: float | None = None
+        self.next_step = 0.0
         self.solver: Any = None
         self.exception: BaseException | None = None
 
@@ -147,7 +159,7 @@ def _watched(method: str) -> type:
             if watch.exception is not None:  # raised by on_step after the last step, which was good
                 self.status = "failed"
                 return _describe(watch.exception)
-            planned = _planned_step(self)
+            planned = max(_planned_step(self), watch.next_step)
             try:
                 message: str | None = super().step()
             except (ArithmeticError, ValueError, np.linalg.LinAlgError, KeyboardInterrupt) as error:
@@ -161,11 +173,10 @@ def _watched(method: str) -> type:
                 return "The state is not finite."
             watch.t, watch.y = float(self.t), self.y
             watch.calls += 1
-            following = _planned_step(self)
-            if following is not None:
+            watch.next_step = _planned_step(self)
+            if self.status == "finished" and not chosen.compiled:
                 # A stock method cuts its last step at the bound and then forgets the uncut one.
-                cut = self.status == "finished" and not chosen.compiled and planned is not None
-                watch.next_step = max(following, planned) if cut and planned is not None else following
+                watch.next_step = max(watch.next_step, planned)
             if watch.on_step is not None:
                 try:
                     watch.on_step(watch.t, watch.y)
@@ -177,12 +188,10 @@ def _watched(method: str) -> type:
     return Watched
 
 
-def _planned_step(solver: Any) -> float | None:
-    """Size of the step that a solver plans, where it says so."""
-    step = getattr(solver, "next_step", None)
-    if step is None:
-        step = getattr(solver, "h_abs", None)
-    return None if step is None or not 0.0 < step < math.inf else float(step)
+def _planned_step(solver: Any) -> float:
+    """Size of the step that a solver plans; 0 when it does not say so."""
+    step = getattr(solver, "next_step", None) or getattr(solver, "h_abs", 0.0)
+    return float(step) if 0.0 < step < math.inf else 0.0
 
 
 def _describe(error: BaseException) -> str:
@@ -266,7 +275,8 @@ def integrate(
     watch = _Watch(float(t0), y0, on_step)
     options: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step, "watch": watch}
     if first_step is not None and t0 != t1:
-        options["first_step"] = min(first_step, abs(t1 - t0))
+        watch.next_step = first_step  # remembered where the span is shorter
+        options["first_step"] = first_step if chosen.compiled else min(first_step, abs(t1 - t0))
     fun: Callable[[float, Array], Array] = system.rhs
     if chosen.compiled:
         options["system"] = system
@@ -299,7 +309,7 @@ def integrate(
         y=found.y if len(found.t) else empty,
         t_end=watch.t,
         y_end=watch.y,
-        next_step=watch.next_step,
+        next_step=watch.next_step if chosen.one_step and watch.next_step > 0.0 else None,
         success=success,
         message=message,
         statistics=Statistics(

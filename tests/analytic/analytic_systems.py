@@ -20,7 +20,13 @@ NO_INTEGERS = np.zeros(1, dtype=np.int64)
 
 def _system(kernel, reals, y0, scale, quadratures=0):
     return System(
-        kernel, NO_INTEGERS, np.array(reals, float), 1, np.array(y0, float), quadratures, np.array(scale, float)
+        kernel,
+        NO_INTEGERS,
+        np.array(reals, float),
+        1,
+        np.array(y0, float),
+        quadratures,
+        np.array(scale, float),
     )
 
 
@@ -66,7 +72,9 @@ class FreeDeadZone:
         sign = np.where(turns % 2 == 0, 1.0, -1.0)
         first, last = s < quarter, s >= quarter + gap
         late = w * (s - quarter - gap)
-        x = np.where(first, b + a * np.cos(w * s), np.where(last, -b - a * np.sin(late), b - a * w * (s - quarter)))
+        x = np.where(
+            first, b + a * np.cos(w * s), np.where(last, -b - a * np.sin(late), b - a * w * (s - quarter))
+        )
         v = np.where(first, -a * w * np.sin(w * s), np.where(last, -a * w * np.cos(late), -a * w))
         return np.array([sign * x, sign * v])
 
@@ -305,7 +313,9 @@ class ForcedBacklash:
                 crossing = np.flatnonzero(height[:-1] * height[1:] < 0.0)
                 if len(crossing):
                     i = crossing[0]
-                    root = brentq(lambda s, f=flank: piece(s)[0] - f, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15)
+                    root = brentq(
+                        lambda s, f=flank: piece(s)[0] - f, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15
+                    )
                     if end is None or root < end[0]:
                         end = root, flank
             if end is None:
@@ -332,7 +342,9 @@ class ForcedBacklash:
                 w = math.sqrt(stiffness - d * d)
                 decay, cos, sin = np.exp(-d * s), np.cos(w * s), np.sin(w * s)
                 slope = (v + d * x) / w
-                return decay * (x * cos + slope * sin), decay * ((slope * w - d * x) * cos - (x * w + d * slope) * sin)
+                return decay * (x * cos + slope * sin), decay * (
+                    (slope * w - d * x) * cos - (x * w + d * slope) * sin
+                )
             return x - v * np.expm1(-2 * d * s) / (2 * d), v * np.exp(-2 * d * s)
 
         return lambda t: np.add(forced(t), free(t - start))
