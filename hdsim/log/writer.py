@@ -1,0 +1,337 @@
+"""Writing a log while the run goes on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hdsim.errors import InputError
+from hdsim.log import naming
+from hdsim.log.container import Container
+from hdsim.log.streams import MessageStream, TableStream
+from hdsim.log.view import MinMaxView
+from hdsim.recording import Event, Table
+
+if TYPE_CHECKING:
+    from hdsim.recording import Column, Recording
+
+    Array = naming.Array
+
+VIEW_SAMPLES = 20_000
+"""Samples of the state in the view of one run: what a viewer plots without a wait."""
+
+DEFAULT_VIEW_RATE_HZ = 1000.0
+
+_LEVELS = {"info": 2, "warning": 3, "error": 4}
+_MEDIA_TYPES = {".yaml": "application/yaml", ".yml": "application/yaml", ".json": "application/json"}
+
+
+def view_rate(duration: float) -> float:
+    """Rate in Hz at which the view of a run of ``duration`` s holds 20,000 samples."""
+    return VIEW_SAMPLES / duration if duration > 0 else np.inf
+
+
+class LogWriter:
+    """A log on its way to the disk; a context manager.
+
+    Everything goes to ``<path>.partial``, which takes its name when the log is closed. When the ``with``
+    block ends by an exception, the log is closed too, with a record and an event that say so, and what was
+    computed can be opened. Only a killed process leaves a ``.partial``, for `hdsim.log.recover_log`.
+
+    Metadata and attachments come first in the file, so that they survive whatever happens later.
+
+    Args:
+        path: where the log will be; folders are made, an existing log is replaced when this one is closed.
+        metadata: names to text: scenario, versions, seed, solver, tolerances.
+        attachments: file names to contents, such as the scenario's YAML text.
+        view_rate_hz: samples a second in the decimated twin of the state; `view_rate` gives one that suits
+            a run's length. Infinite keeps every sample.
+
+    Raises:
+        InputError: the file cannot be made.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        metadata: Mapping[str, str],
+        attachments: Mapping[str, bytes | str] | None = None,
+        view_rate_hz: float = DEFAULT_VIEW_RATE_HZ,
+    ) -> None:
+        self.path = Path(path)
+        self.partial = self.path.with_name(self.path.name + ".partial")
+        for key, value in metadata.items():
+            if not isinstance(value, str):
+                raise InputError(f"metadata {key!r} is {type(value).__name__}; allowed: text")
+        try:
+            if self.path.is_dir():
+                raise InputError(f"{self.path} is a folder; a log needs a file name, such as run.mcap")
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = open(self.partial, "wb")  # noqa: SIM115 - closed in _finish
+        except OSError as error:
+            raise InputError(f"{self.path} cannot be written: {error.strerror}") from None
+        self._view_rate = view_rate_hz
+        self._view: MinMaxView | None = None
+        self._view_stream: TableStream | None = None
+        self._channels = 0
+        self._tables: dict[str, TableStream] = {}
+        self._messages: dict[str, MessageStream] = {}
+        self._schemas: dict[str, int] = {}
+        self._last_event_ns = 0
+        self._open = True
+        self._container = Container(self._file)
+        self._container.metadata(naming.RUN_RECORD, metadata)
+        for name, content in (attachments or {}).items():
+            data = content.encode() if isinstance(content, str) else content
+            media_type = _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
+            self._container.attachment(name, media_type, data, naming.EPOCH_NS)
+        self._container.flush()
+
+    def __enter__(self) -> LogWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if not self._open:
+            return
+        if error is None:
+            self.close()
+        else:
+            self._finish(incomplete=f"{type(error).__name__}: {error}")
+
+    def write_static(self, columns: Mapping[str, Column]) -> None:
+        """Write what does not change in time, once, as one message at time zero.
+
+        Args:
+            columns: arrays of any shape; nothing is written where there are none.
+        """
+        if not columns:
+            return
+        if "static" in self._tables:
+            raise InputError("the static arrays are in the log already")
+        specs = naming.describe_columns(columns, rows=False)
+        row = [np.asarray(c.values, np.float64).reshape(1, -1) for c in columns.values()]
+        flat = [
+            naming.ColumnSpec(s.name, s.field, s.unit, s.description, (values.shape[1],))
+            for s, values in zip(specs, row, strict=True)
+        ]
+        stream = self._add_table("static", naming.STATIC_TOPIC, flat, specs, time=False)
+        stream.append(None, np.array([naming.EPOCH_NS]), row)
+        stream.flush()
+
+    def write(self, name: str, block: Table) -> None:
+        """Write the next rows of a table.
+
+        Args:
+            name: the table; ``state`` gets a decimated twin for viewers.
+            block: rows that follow the last ones; the first block sets the columns, their order and shapes.
+
+        Raises:
+            InputError: other columns than before, or a time that does not increase.
+        """
+        time = np.asarray(block.time, np.float64)
+        specs = naming.describe_columns(block.columns, rows=True)
+        stream = self._tables.get(name)
+        if stream is None:
+            stream = self._add_table(name, naming.topic_of(name), specs, specs)
+            if name == naming.VIEWED_TABLE:
+                self._view = MinMaxView(self._view_rate)
+        columns = [np.asarray(c.values, np.float64) for c in block.columns.values()]
+        stream.check(name, time, specs, columns)
+        log_times = naming.to_ns(time)
+        # The view is fed chunk by chunk, so that the file doesn't depend on how the run was cut in blocks.
+        begin = 0
+        while begin < len(time):
+            end = min(len(time), begin + stream.room)
+            rows = slice(begin, end)
+            piece = [c[rows] for c in columns]
+            full = stream.append(time[rows], log_times[rows], piece)
+            if name == naming.VIEWED_TABLE and self._view is not None:
+                self._write_view(*self._view.feed(time[rows], piece))
+            if full:
+                self._flush_messages()
+            begin = end
+
+    def write_event(self, event: Event) -> None:
+        """Write an event; it reaches the disk with the next chunk.
+
+        Raises:
+            InputError: an unknown level.
+        """
+        from foxglove_schemas_protobuf.Log_pb2 import Log
+        from google.protobuf.timestamp_pb2 import Timestamp
+
+        from hdsim.log.schemas import EVENT_TIME_FIELD, event_schema
+        from hdsim.log.streams import double_field
+
+        if event.level not in _LEVELS:
+            raise InputError(f"event level {event.level!r} is unknown; allowed: {', '.join(_LEVELS)}")
+        at = int(naming.to_ns(np.array([event.time]))[0])
+        seconds, nanos = divmod(at, 1_000_000_000)
+        log = Log(
+            timestamp=Timestamp(seconds=seconds, nanos=nanos),
+            level=_LEVELS[event.level],  # type: ignore[arg-type]
+            message=event.message,
+            name=event.source,
+        )
+        payload = log.SerializeToString(deterministic=True) + double_field(EVENT_TIME_FIELD, event.time)
+        # Log times never go back within a topic; the message itself keeps the exact time.
+        self._last_event_ns = max(at, self._last_event_ns)
+        self.write_messages(
+            naming.EVENT_TOPIC, "foxglove.Log", event_schema, [self._last_event_ns], [payload]
+        )
+
+    def write_messages(
+        self,
+        topic: str,
+        message_type: str,
+        schema: Any,
+        log_times: Iterable[int],
+        payloads: Iterable[bytes],
+    ) -> None:
+        """Write ready protobuf messages to a topic of their own, for what is no table: scenes, transforms.
+
+        Args:
+            topic: such as ``/hd/scene``.
+            message_type: full protobuf name.
+            schema: function that returns the serialized FileDescriptorSet; called once a topic.
+            log_times: ns since 1970, not decreasing.
+            payloads: one serialized message each.
+        """
+        self._check_open()
+        stream = self._messages.get(topic)
+        if stream is None:
+            schema_id = self._schemas.setdefault(message_type, len(self._schemas) + 1)
+            stream = MessageStream(
+                self._container, self._next_channel(), topic, schema_id, message_type, schema()
+            )
+            self._messages[topic] = stream
+        for log_time, payload in zip(log_times, payloads, strict=True):
+            stream.append(log_time, payload)
+
+    def flush(self) -> None:
+        """Write out what waits for its chunk to fill, so that a killed process would not lose it."""
+        for stream in self._tables.values():
+            stream.flush()
+        self._flush_messages()
+        self._container.flush()
+
+    def close(self, statistics: Mapping[str, str] | None = None) -> Path:
+        """Finish the file and give it its name.
+
+        Args:
+            statistics: what is known at the end only (steps, run time); joins the metadata.
+
+        Returns:
+            The log's path.
+        """
+        if self._open:
+            self._finish(statistics=statistics)
+        return self.path
+
+    def _check_open(self) -> None:
+        if not self._open:
+            raise InputError(f"{self.path} is closed")
+
+    def _next_channel(self) -> int:
+        self._channels += 1
+        return self._channels
+
+    def _add_table(
+        self,
+        name: str,
+        topic: str,
+        layout: Sequence[naming.ColumnSpec],
+        described: Sequence[naming.ColumnSpec],
+        *,
+        time: bool = True,
+    ) -> TableStream:
+        self._check_open()
+        message_type = naming.message_type_of(name)
+        schema_id = self._schemas.setdefault(message_type, len(self._schemas) + 1)
+        text = naming.columns_to_json(described)
+        self._container.metadata(naming.TABLE_RECORD + name, {"topic": topic, "columns": text})
+
+        def make(topic: str) -> TableStream:
+            return TableStream(
+                self._container, self._next_channel(), topic, schema_id, message_type, layout, text, time=time
+            )
+
+        self._tables[name] = stream = make(topic)
+        if name == naming.VIEWED_TABLE:
+            self._view_stream = make(topic + naming.VIEW_SUFFIX)
+        return stream
+
+    def _write_view(self, time: Array, columns: list[Array]) -> None:
+        stream = self._view_stream
+        begin = 0
+        while stream is not None and begin < len(time):
+            rows = slice(begin, begin + stream.room)
+            stream.append(time[rows], naming.to_ns(time[rows]), [c[rows] for c in columns])
+            begin = rows.stop
+
+    def _flush_messages(self) -> None:
+        for stream in self._messages.values():
+            stream.flush()
+
+    def _finish(self, statistics: Mapping[str, str] | None = None, incomplete: str | None = None) -> None:
+        if incomplete is not None:
+            ends = [s.last_time for s in self._tables.values() if s.last_time is not None]
+            self.write_event(
+                Event(max(ends, default=0.0), "error", "hdsim.log", f"run incomplete: {incomplete}")
+            )
+        self._open = False
+        try:
+            for name, stream in self._tables.items():
+                stream.flush()
+                if name == naming.VIEWED_TABLE and self._view is not None and self._view_stream is not None:
+                    rest = self._view.finish()
+                    if rest is not None:
+                        self._write_view(*rest)
+                    self._view_stream.flush()
+            self._flush_messages()
+            if statistics:
+                self._container.metadata(naming.STATISTICS_RECORD, statistics)
+            if incomplete is not None:
+                self._container.metadata(naming.INCOMPLETE_RECORD, {"reason": incomplete})
+            self._container.finish()
+        finally:
+            self._file.close()
+        os.replace(self.partial, self.path)
+
+
+def write_log(
+    recording: Recording, path: str | Path, *, attachments: Mapping[str, bytes | str] | None = None
+) -> Path:
+    """Write a whole recording.
+
+    Args:
+        recording: what to write; arrays come back bit by bit from `hdsim.log.open_log`.
+        path: where to.
+        attachments: file names to contents. The text under ``scenario`` in the metadata is attached as
+            ``scenario.yaml`` unless there is an attachment of that name.
+
+    Returns:
+        The log's path.
+    """
+    files = dict(attachments or {})
+    if "scenario" in recording.metadata:
+        files.setdefault("scenario.yaml", recording.metadata["scenario"])
+    state = recording.tables.get(naming.VIEWED_TABLE)
+    rate = np.inf
+    if state is not None and len(state) > VIEW_SAMPLES:
+        rate = view_rate(float(state.time[-1] - state.time[0]))
+    with LogWriter(path, metadata=recording.metadata, attachments=files, view_rate_hz=rate) as log:
+        log.write_static(recording.static)
+        for event in recording.events:
+            log.write_event(event)
+        for name, table in recording.tables.items():
+            log.write(name, table)
+    return Path(path)

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from hdsim.log import write_log
+from hdsim.log.view import MinMaxView
+from hdsim.recording import Column, Recording, Table
+
+
+def view_of(time, columns, rate, cuts=()):
+    view = MinMaxView(rate)
+    parts = [
+        view.feed(time[a:b], [c[a:b] for c in columns])
+        for a, b in zip([0, *cuts], [*cuts, len(time)], strict=True)
+    ]
+    last = view.finish()
+    if last is not None:
+        parts.append(last)
+    return (
+        np.concatenate([p[0] for p in parts]),
+        [np.concatenate([p[1][i] for p in parts]) for i in range(len(columns))],
+    )
+
+
+values = st.one_of(st.floats(-10, 10), st.just(np.nan))
+
+
+@given(st.integers(1, 200).flatmap(lambda n: hnp.arrays(np.float64, (n, 3), elements=values)), st.data())
+@settings(deadline=None)
+def test_no_extreme_is_lost_and_times_increase(table, data):
+    n = len(table)
+    time = np.cumsum(data.draw(hnp.arrays(np.float64, n, elements=st.floats(1e-3, 2.0)))) - 20.0
+    rate = data.draw(st.floats(0.05, 10.0))
+    cuts = sorted(data.draw(st.lists(st.integers(0, n), max_size=4)))
+    thin_time, (thin,) = view_of(time, [table], rate, cuts)
+    assert (np.diff(thin_time) > 0).all()
+    assert np.isin(thin_time, time).all()
+    slot, thin_slot = np.floor(time * rate / 2), np.floor(thin_time * rate / 2)
+    for s in np.unique(slot):
+        inside, kept = table[slot == s], thin[thin_slot == s]
+        assert len(kept) == min(2, len(inside))
+        if len(inside) <= 2:
+            np.testing.assert_array_equal(kept, inside)
+            continue
+        for j in range(3):
+            there = inside[~np.isnan(inside[:, j]), j]
+            if len(there):
+                assert sorted(kept[:, j]) == [there.min(), there.max()]
+            else:
+                assert np.isnan(kept[:, j]).all()
+    whole_time, (whole,) = view_of(time, [table], rate)
+    np.testing.assert_array_equal(thin_time, whole_time)
+    np.testing.assert_array_equal(thin, whole)
+
+
+def test_a_falling_slot_keeps_falling():
+    time = np.arange(8.0)
+    _, (thin,) = view_of(time, [np.array([0, 5, 2, 4, 9, 3, 8, 1.0])], 0.5)
+    assert thin.tolist() == [0, 5, 9, 1]
+
+
+def read_topic(path, topic):
+    from mcap.reader import make_reader
+
+    from hdsim.log.schemas import message_class
+
+    with open(path, "rb") as file:
+        return [
+            message_class(schema.name, schema.data).FromString(message.data)
+            for schema, _, message in make_reader(file).iter_messages([topic])
+        ]
+
+
+@pytest.mark.parametrize(("n", "least", "most"), [(3_000, 3_000, 3_000), (100_000, 19_000, 20_002)])
+def test_the_view_of_a_run_holds_at_most_20000_samples_and_its_peak(tmp_path, n, least, most):
+    time = np.linspace(2.0, 12.0, n)
+    angle = np.sin(time)
+    angle[n // 3] = 1e6
+    path = write_log(Recording({"state": Table(time, {"angle": Column(angle, "rad")})}), tmp_path / "a.mcap")
+    messages = read_topic(path, "/hd/state_view")
+    assert least <= len(messages) <= most
+    assert max(m.angle for m in messages) == 1e6
+    assert min(m.angle for m in messages) == angle.min()
