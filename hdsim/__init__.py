@@ -1,1 +1,66 @@
-"""hdsim: dynamics of harmonic drives, from the rough tooth flank to the log."""
+"""hdsim: dynamics of harmonic drives, from the rough tooth flank to the log.
+
+>>> import hdsim
+>>> scenario = hdsim.load_scenario("scenarios/seed_move.yaml")
+>>> result = hdsim.simulate(scenario)
+>>> result["transmission_error"], result.unit("transmission_error")
+>>> result.plot().savefig("seed_move.png")
+>>> result.save("logs/seed_move.mcap")
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hdsim.errors import HdsimError, InputError, PhysicsError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from hdsim.log import open_log
+    from hdsim.recording import Recording
+    from hdsim.scenario import Scenario
+    from hdsim.simulation.linear import io_system, linearize
+    from hdsim.simulation.simulate import simulate
+
+__all__ = [
+    "HdsimError",
+    "InputError",
+    "PhysicsError",
+    "Recording",
+    "Scenario",
+    "io_system",
+    "linearize",
+    "load_scenario",
+    "open_log",
+    "simulate",
+]
+
+# Loaded when first used: importing hdsim imports neither numpy nor numba.
+_HOMES = {
+    "Recording": "hdsim.recording",
+    "Scenario": "hdsim.scenario",
+    "io_system": "hdsim.simulation.linear",
+    "linearize": "hdsim.simulation.linear",
+    "open_log": "hdsim.log",
+    "simulate": "hdsim.simulation.simulate",
+}
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario and everything that it extends.
+
+    Raises:
+        InputError: with one line for every mistake: file, line, field, what was found, what is allowed.
+    """
+    from hdsim.scenario import Scenario
+
+    return Scenario.from_yaml(path)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        from importlib import import_module
+
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -620,16 +620,19 @@ def drive_system(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, df
 
 
 @_jit
-def observe(times, states, integers, reals, inside, scratch, kept, rows):  # type: ignore[no-untyped-def]
+def observe(times, states, integers, reals, inside, place, held, scratch, kept, rows):  # type: ignore[no-untyped-def]
     """Evaluate at every sample and keep the first ``kept`` numbers of the scratch: shape (samples, kept).
 
-    ``inside`` holds, for each sample, a time inside its smooth span.
+    ``inside`` holds, for each sample, a time inside its smooth span; ``held`` what stood at ``place`` of the
+    reals then (the held torque of a sampled controller; no place: -1).
     """
     n = integers[STATES]
     dy = np.empty(n)
     nothing = np.empty(0)
     for k in range(times.shape[0]):
         reals[INSIDE] = inside[k]
+        if place >= 0:
+            reals[place] = held[k]
         evaluate_arrays(times[k], states[k], integers, reals, scratch, 0, dy, nothing, nothing)
         for c in range(kept):
             rows[k, c] = scratch[c]

@@ -13,7 +13,7 @@ from hdsim.drive.parameters import ClearanceEngagement, Drive, TabulatedMesh, To
 from hdsim.errors import PhysicsError
 
 if TYPE_CHECKING:
-    from hdsim.contact.base import ContactLaw
+    from hdsim.contact.law import ContactLaw
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ class Teeth:
         """Contact in series with the bending of the tooth."""
         from hdsim.contact import SeriesLaw
 
-        law = self.mesh.contact.build(self.mesh.flanks)
+        law = self.mesh.contact.build(self.mesh.flanks.equivalent())
         bending = self.mesh.tooth_bending_stiffness_n_per_m
         return law if bending is None else SeriesLaw(law, bending)
 
@@ -111,7 +111,7 @@ class Teeth:
         table = tabulate(self.law, 20 * self.rated_tooth_force_n)
         header = self._header
         header[_mesh.CONTACT_STEP] = table.step_m
-        header[_mesh.CONTACT_CELLS] = len(table.coefficients)
+        header[_mesh.CONTACT_CELLS] = table.count
         header[_mesh.CONTACT_AT] = self._place(table.coefficients)
 
     def _place_gaps(self, seed: int) -> None:

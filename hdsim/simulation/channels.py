@@ -22,6 +22,7 @@ from hdsim.kernel import (
 from hdsim.recording import Column, Table
 
 if TYPE_CHECKING:
+    from hdsim.actuation.signal_data import SignalData
     from hdsim.drive.model import Model
 
 Array = NDArray[np.float64]
@@ -32,10 +33,10 @@ class Observer:
 
     Args:
         model: the model.
-        reference: ``motor`` or ``output`` and the column of the reference signal, or None.
+        reference: the commanded angle of the output, or None.
     """
 
-    def __init__(self, model: Model, reference: tuple[str, int] | None = None) -> None:
+    def __init__(self, model: Model, reference: SignalData | None = None) -> None:
         self.model = model
         self.reference = reference
         self._start_energy: float | None = None
@@ -44,13 +45,17 @@ class Observer:
         self._rows = OWN + len(model.states)
         self._kept = a.S_INPUTS + self._columns + self._rows
 
-    def samples(self, times: Array, states: Array, inside: Array) -> Array:
+    def samples(
+        self, times: Array, states: Array, inside: Array, held: Array | None = None, place: int = -1
+    ) -> Array:
         """The compiled code's scratch at every sample, shape (samples, kept + states).
 
         Args:
             times: shape (m,), s.
             states: shape (m, n).
             inside: shape (m,), a time within each sample's smooth span.
+            held: shape (m,), torque that a sampled controller held at each sample, N m.
+            place: where in the system's reals that torque stands.
         """
         system = self.model.system
         rows = np.empty((len(times), self._kept + system.size))
@@ -60,6 +65,8 @@ class Observer:
             system.integers,
             system.reals,
             inside,
+            place,
+            np.zeros(len(times)) if held is None else held,
             np.zeros(system.scratch_size),
             self._kept,
             rows,
@@ -80,7 +87,7 @@ class Observer:
         """Torque at the motor shaft: the windings', or what a prescribed motion costs, N m."""
         return self.outputs(rows, COMMANDED_TORQUE) + rows[:, a.S_CONSTRAINT]
 
-    def state_table(self, times: Array, states: Array, rows: Array) -> Table:
+    def state_table(self, times: Array, states: Array, inside: Array, rows: Array) -> Table:
         """The channels at full rate."""
         model = self.model
         motor, ring, output = (rows[:, a.S_ANGLES + k] for k in range(3))
@@ -112,17 +119,9 @@ class Observer:
             columns["ring_angle"] = Column(ring, "rad", "flexspline toothed ring")
             columns["ring_velocity"] = Column(ring_v, "rad/s", "flexspline toothed ring")
         if self.reference is not None:
-            side, column = self.reference
-            wanted = self.inputs(rows, column)
-            if side == "motor":
-                wanted = wanted / model.ratio
-                reached = motor / model.ratio
-            else:
-                reached = output
-            columns["reference_angle"] = Column(wanted, "rad", "reference, at the output")
-            columns["tracking_error"] = Column(
-                reached - wanted, "rad", f"{side} angle less reference, at the output"
-            )
+            wanted = self.reference.values(times, inside)[0]
+            columns["reference_angle"] = Column(wanted, "rad", "commanded angle, at the output")
+            columns["tracking_error"] = Column(output - wanted, "rad", "output angle less commanded angle")
         columns |= {
             "transmission_error": Column(
                 output - motor / model.ratio, "rad", "output angle less motor angle over ratio"

@@ -7,6 +7,7 @@ way loses nothing when a run is stopped.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -21,6 +22,7 @@ from hdsim.simulation.channels import Observer
 from hdsim.simulation.solvers import Statistics, integrate
 
 if TYPE_CHECKING:
+    from hdsim.actuation.signal_data import SignalData
     from hdsim.drive.model import Model
 
 Array = NDArray[np.float64]
@@ -79,7 +81,9 @@ class Audit:
 
 
 class RunFailed(HdsimError):  # noqa: N818 - read aloud: "run failed"
-    """The integration stopped before the end; everything up to there was kept."""
+    """The integration stopped before the end; ``recording`` holds everything up to there."""
+
+    recording: Recording | None = None
 
 
 class Run:
@@ -92,9 +96,10 @@ class Run:
         teeth_rate_hz: rate of the teeth table (0: none); at most the sample rate.
         y0: initial state; the model's own when None.
         method: name in ``hdsim.simulation.solvers.METHODS``.
-        rtol: relative tolerance; absolute tolerances follow from the states' scales.
+        rtol: relative tolerance.
+        atol: absolute tolerance of every state in its unit; rtol times each state's scale when None.
         max_step_s: largest step.
-        reference: side and input column of the reference signal.
+        reference: the commanded angle of the output, rad.
         loop: the sampled controller.
 
     Attributes:
@@ -114,15 +119,16 @@ class Run:
         y0: Array | None = None,
         method: str = "rodas4",
         rtol: float = 1e-6,
+        atol: float | None = None,
         max_step_s: float = math.inf,
-        reference: tuple[str, int] | None = None,
+        reference: SignalData | None = None,
         loop: SampledLoop | None = None,
     ) -> None:
         self.model = model
         self.duration_s = duration_s
         self.sample_rate_hz = sample_rate_hz
         self.teeth_every = max(1, round(sample_rate_hz / teeth_rate_hz)) if teeth_rate_hz > 0 else 0
-        self.method, self.rtol, self.max_step_s = method, rtol, max_step_s
+        self.method, self.rtol, self.atol, self.max_step_s = method, rtol, atol, max_step_s
         self.y0 = model.system.y0.copy() if y0 is None else y0
         self.loop = loop
         self.observer = Observer(model, reference)
@@ -167,9 +173,10 @@ class Run:
         times: list[Array] = []
         states: list[Array] = []
         insides: list[Array] = []
+        helds: list[Array] = []
         waiting = 0
         done = 0
-        for t0, t1 in zip(cuts[:-1], cuts[1:], strict=True):
+        for t0, t1 in itertools.pairwise(cuts):
             inside = 0.5 * (t0 + t1)
             reals[a.INSIDE] = inside
             if self.loop is not None:
@@ -178,11 +185,12 @@ class Run:
             wanted = samples[done:last]
             found = integrate(
                 self.model.system,
-                t0,
-                t1,
+                float(t0),
+                float(t1),
                 y,
                 method=self.method,
                 rtol=self.rtol,
+                atol=self.atol,
                 t_eval=np.clip(wanted, t0, t1),
                 first_step=step,
                 max_step=self.max_step_s,
@@ -194,6 +202,7 @@ class Run:
                 times.append(wanted[:got])
                 states.append(found.y.T)
                 insides.append(np.full(got, inside))
+                helds.append(np.full(got, 0.0 if self.loop is None else reals[self.loop.place]))
                 waiting += got
             y, step, done = found.y_end, found.next_step, last
             if on_time is not None:
@@ -201,8 +210,8 @@ class Run:
             if not found.success:
                 self._fail(found)
             if waiting >= BLOCK or (waiting and (self.failure or t1 == cuts[-1])):
-                yield self._block(np.concatenate(times), np.concatenate(states), np.concatenate(insides))
-                times, states, insides, waiting = [], [], [], 0
+                yield self._block(*(np.concatenate(part) for part in (times, states, insides, helds)))
+                times, states, insides, helds, waiting = [], [], [], [], 0
             if self.failure:
                 break
 
@@ -213,17 +222,22 @@ class Run:
         if abs(t / loop.period_s - round(t / loop.period_s)) > 1e-6:
             return
         rows = self.observer.samples(np.array([t]), y[None, :], np.array([inside]))
-        now = self.observer.state_table(np.array([t]), y[None, :], rows)
+        now = self.observer.state_table(np.array([t]), y[None, :], np.array([inside]), rows)
         self._recent = _extended(self._recent, now, t - self.observer.memory)
         readings = {name: float(column.values[-1]) for name, column in now.columns.items()}
         for name, column in self.observer.sensed(self._recent, np.array([t])).items():
             readings[name.removeprefix("measured_")] = float(column.values[-1])
         self.model.system.reals[loop.place] = loop.controller.update(t, readings)
 
-    def _block(self, times: Array, states: Array, inside: Array) -> dict[str, Table]:
+    def _block(self, times: Array, states: Array, inside: Array, held: Array) -> dict[str, Table]:
         """The tables of a block of samples."""
-        rows = self.observer.samples(times, states, inside)
-        table = self.observer.state_table(times, states, rows)
+        if self.loop is None:
+            rows = self.observer.samples(times, states, inside)
+        else:
+            now = self.model.system.reals[self.loop.place]
+            rows = self.observer.samples(times, states, inside, held, self.loop.place)
+            self.model.system.reals[self.loop.place] = now
+        table = self.observer.state_table(times, states, inside, rows)
         self.audit.add(table)
         tables = {"state": table}
         if self.model.sensors:

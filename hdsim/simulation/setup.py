@@ -1,0 +1,56 @@
+"""From a scenario to a model and a run."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from hdsim.drive.model import Model
+from hdsim.simulation.run import Run, SampledLoop
+
+if TYPE_CHECKING:
+    from hdsim.scenario import Scenario
+
+
+def build_model(scenario: Scenario) -> Model:
+    """The scenario's drive with its effects, load and commands, as an ODE."""
+    drive = scenario.drive
+    motions = {motion.axis: motion.signal for motion in scenario.command.motions(drive.ratio)}
+    return Model(
+        drive,
+        [*scenario.effects.active().values(), scenario.load, scenario.command],
+        load_inertia_kg_m2=scenario.load.inertia_kg_m2,
+        motions=dict(motions),
+        seed=scenario.run.seed,
+    )
+
+
+def build_run(scenario: Scenario) -> Run:
+    """The scenario ready to be integrated."""
+    from hdsim.actuation._kernels import held_torque
+
+    model = build_model(scenario)
+    settings = scenario.run
+    start = settings.start
+    loop = None
+    controller = scenario.command.sampled(model.ratio)
+    if controller is not None:
+        place = next(at for kernel, at in model.element_places if kernel is held_torque)
+        loop = SampledLoop(controller, controller.period, place)
+    return Run(
+        model,
+        duration_s=settings.duration_s,
+        sample_rate_hz=settings.sample_rate_hz,
+        teeth_rate_hz=settings.teeth_rate_hz,
+        y0=model.initial_state(
+            motor_angle=start.motor_angle_rad,
+            motor_velocity=start.motor_velocity_rad_per_s,
+            output_twist=start.output_twist_rad,
+        ),
+        method=settings.method,
+        rtol=settings.rtol,
+        atol=settings.atol,
+        max_step_s=math.inf if settings.max_step_s is None else settings.max_step_s,
+        reference=scenario.command.reference(model.ratio),
+        loop=loop,
+    )

@@ -1,0 +1,146 @@
+"""Simulate a scenario: in memory, or straight into a log."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hdsim.simulation.run import Run, RunFailed
+from hdsim.simulation.setup import build_run
+
+if TYPE_CHECKING:
+    from hdsim.recording import Recording
+    from hdsim.scenario import Scenario
+
+#: Packages whose versions a log keeps.
+_PACKAGES = ("hdsim", "numpy", "scipy", "numba", "control", "mcap", "pydantic")
+
+
+def simulate(
+    scenario: Scenario, *, on_time: Callable[[float], object] | None = None, strict: bool = True
+) -> Recording:
+    """Simulate a scenario and keep the result in memory.
+
+    Args:
+        scenario: what to simulate.
+        on_time: called now and then with the simulated time that has been reached, s.
+        strict: raise when the run stops early; else return what was computed, with the event that says why.
+
+    Returns:
+        The recording: tables ``state`` and ``teeth``, static arrays, events and provenance.
+
+    Raises:
+        RunFailed: the run stopped early; its ``recording`` holds what was computed.
+    """
+    run = build_run(scenario)
+    started = time.perf_counter()
+    recording = run.record(on_time)
+    recording.metadata.update(provenance(scenario))
+    recording.metadata.update(summary(run, time.perf_counter() - started))
+    if run.interrupted is not None:
+        raise run.interrupted
+    if run.failure and strict:
+        error = RunFailed(run.failure)
+        error.recording = recording
+        raise error
+    return recording
+
+
+def simulate_to_log(
+    scenario: Scenario, path: str | Path, *, on_time: Callable[[float], object] | None = None
+) -> Run:
+    """Simulate a scenario and write its log block by block, so that a stopped run keeps what it computed.
+
+    Args:
+        scenario: what to simulate.
+        path: the log; ``<path>.partial`` until it is complete.
+        on_time: called now and then with the simulated time that has been reached, s.
+
+    Returns:
+        The run, with audit, statistics and, if it stopped early, its ``failure``.
+    """
+    from hdsim.log import LogWriter
+
+    run = build_run(scenario)
+    started = time.perf_counter()
+    static = run.static()
+    with LogWriter(path, metadata=provenance(scenario), attachments={"scenario.yaml": scenario.to_yaml()}) as log:
+        if static:
+            log.write_static(static)
+        told = 0
+        for tables in run.blocks(on_time):
+            for name, table in tables.items():
+                log.write(name, table)
+            for event in run.events[told:]:
+                log.write_event(event)
+            told = len(run.events)
+        for event in run.events[told:]:
+            log.write_event(event)
+        log.close(summary(run, time.perf_counter() - started))
+    if run.interrupted is not None:
+        raise run.interrupted
+    return run
+
+
+def provenance(scenario: Scenario) -> dict[str, str]:
+    """What made a run: scenario, versions, git state, seed, solver and tolerances."""
+    settings = scenario.run
+    found = {
+        "scenario_name": scenario.name,
+        "scenario": scenario.to_yaml(),
+        "seed": str(settings.seed),
+        "method": settings.method,
+        "rtol": repr(settings.rtol),
+        "atol": "rtol times each state's scale" if settings.atol is None else repr(settings.atol),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+    }
+    found |= {f"version_{name}": version(name) for name in _PACKAGES}
+    git = _git_state()
+    if git:
+        found["git"] = git
+    return found
+
+
+def summary(run: Run, seconds: float) -> dict[str, str]:
+    """What came out of a run: work of the solver and the energy audit."""
+    statistics = run.statistics
+    found = {
+        "wall_time_s": f"{seconds:.3f}",
+        "steps": str(statistics.steps),
+        "right_hand_sides": str(statistics.nfev),
+        "energy_residual_j": f"{run.audit.residual:.3e}",
+        "energy_exchanged_j": f"{run.audit.exchanged:.3e}",
+        "energy_residual_relative": f"{run.audit.relative:.3e}",
+    }
+    teeth = run.model.teeth
+    if teeth is not None and teeth.table_error is not None:
+        found["mesh_table_error"] = f"{teeth.table_error:.3e} of the rated torque"
+    if run.failure:
+        found["failure"] = run.failure
+    return found
+
+
+def _git_state() -> str:
+    """Commit of the checkout that hdsim runs from, with ``+`` for uncommitted changes; empty elsewhere."""
+    import subprocess
+
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return ""
+    try:
+        commit = subprocess.run(
+            ["git", "describe", "--always", "--abbrev=12", "--dirty=+"],
+            cwd=root,
+            capture_output=True,
+            text=True,
+            timeout=5,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return commit.stdout.strip()
