@@ -2,9 +2,9 @@
 
 A six-stage, stiffly accurate, L-stable Rosenbrock method of order 4 with an embedded one of order 3 and a
 continuous extension of order 3: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed.,
-Springer 1996, section IV.7 (method, implementation without matrix products, eq. 7.25; coefficients of
-RODAS in the book's code of that name). Step-size control: the same book, section IV.8, eq. 8.25
-(Gustafsson's predictive controller). Initial step: Hairer, Norsett, Wanner, *... I*, 2nd ed., section II.4.
+Springer 1996, section IV.7 (coefficients in ``_rodas.py``). Step-size control: the same book, section IV.8
+(Gustafsson's predictive controller). Initial step: Hairer, Norsett, Wanner, *Solving Ordinary Differential
+Equations I*, 2nd ed., section II.4.
 
 With u = sum gamma_ij k_j a step from (t, y) of size h solves, for i = 1..6,
 
@@ -18,44 +18,15 @@ The model comes in as the address of its system kernel, so nothing here depends 
 from __future__ import annotations
 
 from math import isfinite, sqrt
+from typing import Any
 
 import numpy as np
 from numba import njit
 
 from hdsim._abi import call_system
+from hdsim.simulation import _rodas as c
 
-GAMMA = 0.25
-C2, C3, C4 = 0.386, 0.21, 0.63
-D1, D2, D3, D4 = 0.25, -0.1043, 0.1035, -0.03620000000000023
-A21 = 1.544
-A31, A32 = 0.9466785280815826, 0.2557011698983284
-A41, A42, A43 = 3.314825187068521, 2.896124015972201, 0.9986419139977817
-A51, A52, A53, A54 = 1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950
-C21 = -5.6688
-C31, C32 = -2.430093356833875, -0.2063599157091915
-C41, C42, C43 = -0.1073529058151375, -9.594562251023355, -20.47028614809616
-C51, C52, C53, C54 = 7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160
-C61, C62, C63, C64, C65 = (
-    8.083246795921522,
-    -7.981132988064893,
-    -31.52159432874371,
-    16.31930543123136,
-    -6.058818238834054,
-)
-H21, H22, H23, H24, H25 = (
-    10.12623508344586,
-    -7.487995877610167,
-    -34.80091861555747,
-    -7.992771707568823,
-    1.025137723295662,
-)
-H31, H32, H33, H34, H35 = (
-    -0.6762803392801253,
-    6.087714651680015,
-    16.43084320892478,
-    24.76722511418386,
-    -6.594389125716872,
-)
+_jit: Any = njit(cache=True, nogil=True, error_model="numpy")
 
 # Step-size control of the book's code: safety factor, largest shrinking and largest growth of a step.
 _SAFETY = 0.9
@@ -67,7 +38,7 @@ _HOPELESS = 25
 #: Largest value of s^2 (1 - s), which multiplies the cubic term of the continuous extension. That term tells
 #: h^3 y''' / 6; its size to the power 4/3, in units of the state, is that of h^4 y'''' / 384, the error of a
 #: cubic through both ends (within 10 % for a sine). The embedded estimate alone is blind to it in the stiff
-#: limit, where it dies out with 1 / (h * stiffness): the steps would be right and the samples between them not.
+#: limit, where it dies out with 1 / (h * stiffness): right steps, wrong samples between them.
 _CUBIC_PEAK = 4.0 / 27.0
 
 # What ``control`` holds.
@@ -88,7 +59,7 @@ def work_size(size: int, quadratures: int) -> int:
     return 10 * size + size * size + core * core + core
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def _factorise(matrix, inverse, pivots, size):  # type: ignore[no-untyped-def]
     """LU decomposition in place, partial pivoting; ``inverse`` gets the inverse pivots."""
     for k in range(size):
@@ -109,7 +80,7 @@ def _factorise(matrix, inverse, pivots, size):  # type: ignore[no-untyped-def]
                     matrix[i, j] -= factor * matrix[k, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def _solve(matrix, inverse, pivots, core, jacobian, size, step_gamma, b):  # type: ignore[no-untyped-def]
     """Solve (1/(h gamma) - J) x = b in place: LU for the core, back-substitution for the quadratures."""
     for k in range(core):
@@ -135,7 +106,7 @@ def _solve(matrix, inverse, pivots, core, jacobian, size, step_gamma, b):  # typ
         b[i] = value * step_gamma
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def _scaled_norm(values, y, rtol, atol):  # type: ignore[no-untyped-def]
     """Root mean square of values / (atol + rtol |y|), SciPy's norm."""
     total = 0.0
@@ -145,7 +116,7 @@ def _scaled_norm(values, y, rtol, atol):  # type: ignore[no-untyped-def]
     return sqrt(total / len(y))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def _initial_step(address, t, y, integers, reals, scratch, f, span, rtol, atol, trial, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
     """Size of the first step: one explicit Euler step tells the second derivative. ``span`` is signed."""
     d0, d1 = _scaled_norm(y, y, rtol, atol), _scaled_norm(f, y, rtol, atol)
@@ -164,7 +135,7 @@ def _initial_step(address, t, y, integers, reals, scratch, f, span, rtol, atol, 
     return chosen if isfinite(chosen) else guess
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def _first_not_finite(values):  # type: ignore[no-untyped-def]
     """Index of the first non-finite value, -1 if there is none."""
     for i in range(len(values)):
@@ -173,7 +144,7 @@ def _first_not_finite(values):  # type: ignore[no-untyped-def]
     return -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def _suspect(address, t, h, y, integers, reals, scratch, f, jacobian, dfdt, trial, dy):  # type: ignore[no-untyped-def]
     """Index of the state whose equation gives the first bad number, at (t, y) or one Euler step on."""
     bad = _first_not_finite(f)
@@ -188,7 +159,7 @@ def _suspect(address, t, h, y, integers, reals, scratch, f, jacobian, dfdt, tria
     return bad
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def advance(address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces):  # type: ignore[no-untyped-def]
     """Take up to ``len(pieces)`` accepted steps, stopping exactly at ``control[T_BOUND]``.
 
@@ -208,7 +179,8 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
         pieces: shape (k, 2, n); gets the rest of the continuous extension.
 
     Returns:
-        RUNNING, FINISHED, STEP_TOO_SMALL or NOT_FINITE; ``counts[SUSPECT]`` then names the state, -1 if unknown.
+        RUNNING, FINISHED, STEP_TOO_SMALL or NOT_FINITE; then ``counts[SUSPECT]`` is the state that failed,
+        -1 if unknown.
     """
     n, core = counts[SIZE], counts[SIZE] - counts[QUADRATURES]
     pivots = counts[COUNTS_SIZE:]
@@ -253,49 +225,49 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
             h = direction * size
             t_new = t_bound if last else t + h
 
-            diagonal = 1.0 / (h * GAMMA)
+            diagonal = 1.0 / (h * c.GAMMA)
             for i in range(core):
                 for j in range(core):
                     matrix[i, j] = -jacobian[i, j]
                 matrix[i, i] += diagonal
             _factorise(matrix, inverse, pivots, core)
             counts[NLU] += 1
-            step_gamma = h * GAMMA
+            step_gamma = h * c.GAMMA
             p = 1.0 / h
 
-            s1 = h * D1
+            s1 = h * c.D1
             for i in range(n):
                 u1[i] = f[i] + s1 * dfdt[i]
             _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u1)
 
             for i in range(n):
-                new[i] = y[i] + A21 * u1[i]
-            call_system(address, t + C2 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
-            s1, s2 = p * C21, h * D2
+                new[i] = y[i] + c.A21 * u1[i]
+            call_system(address, t + c.C2 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2 = p * c.C21, h * c.D2
             for i in range(n):
                 u2[i] = dy[i] + s1 * u1[i] + s2 * dfdt[i]
             _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u2)
 
             for i in range(n):
-                new[i] = y[i] + A31 * u1[i] + A32 * u2[i]
-            call_system(address, t + C3 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
-            s1, s2, s3 = p * C31, p * C32, h * D3
+                new[i] = y[i] + c.A31 * u1[i] + c.A32 * u2[i]
+            call_system(address, t + c.C3 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2, s3 = p * c.C31, p * c.C32, h * c.D3
             for i in range(n):
                 u3[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * dfdt[i]
             _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u3)
 
             for i in range(n):
-                new[i] = y[i] + A41 * u1[i] + A42 * u2[i] + A43 * u3[i]
-            call_system(address, t + C4 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
-            s1, s2, s3, s4 = p * C41, p * C42, p * C43, h * D4
+                new[i] = y[i] + c.A41 * u1[i] + c.A42 * u2[i] + c.A43 * u3[i]
+            call_system(address, t + c.C4 * h, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
+            s1, s2, s3, s4 = p * c.C41, p * c.C42, p * c.C43, h * c.D4
             for i in range(n):
                 u4[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * dfdt[i]
             _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u4)
 
             for i in range(n):
-                new[i] = y[i] + A51 * u1[i] + A52 * u2[i] + A53 * u3[i] + A54 * u4[i]
+                new[i] = y[i] + c.A51 * u1[i] + c.A52 * u2[i] + c.A53 * u3[i] + c.A54 * u4[i]
             call_system(address, t_new, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
-            s1, s2, s3, s4 = p * C51, p * C52, p * C53, p * C54
+            s1, s2, s3, s4 = p * c.C51, p * c.C52, p * c.C53, p * c.C54
             for i in range(n):
                 u5[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * u4[i]
             _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u5)
@@ -303,7 +275,7 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
             for i in range(n):
                 new[i] += u5[i]
             call_system(address, t_new, new, integers, reals, scratch, 0, dy, jacobian, dfdt)
-            s1, s2, s3, s4, s5 = p * C61, p * C62, p * C63, p * C64, p * C65
+            s1, s2, s3, s4, s5 = p * c.C61, p * c.C62, p * c.C63, p * c.C64, p * c.C65
             for i in range(n):
                 u6[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * u4[i] + s5 * u5[i]
             _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u6)
@@ -314,7 +286,7 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
                 tolerance = 1.0 / (atol[i] + rtol * max(abs(y[i]), abs(new[i])))
                 ratio = u6[i] * tolerance
                 total += ratio * ratio
-                cubic = H31 * u1[i] + H32 * u2[i] + H33 * u3[i] + H34 * u4[i] + H35 * u5[i]
+                cubic = c.H31 * u1[i] + c.H32 * u2[i] + c.H33 * u3[i] + c.H34 * u4[i] + c.H35 * u5[i]
                 pieces[k, 1, i] = cubic
                 ratio = cubic * tolerance
                 bend += ratio * ratio
@@ -371,7 +343,7 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
         for i in range(n):
             y[i] = new[i]
             states[k + 1, i] = new[i]
-            pieces[k, 0, i] = H21 * u1[i] + H22 * u2[i] + H23 * u3[i] + H24 * u4[i] + H25 * u5[i]
+            pieces[k, 0, i] = c.H21 * u1[i] + c.H22 * u2[i] + c.H23 * u3[i] + c.H24 * u4[i] + c.H25 * u5[i]
         t = t_new
         times[k + 1] = t
         control[T] = t
@@ -382,9 +354,9 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
     return RUNNING
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def interpolate(times, states, pieces, count, t, out):  # type: ignore[no-untyped-def]
-    """Evaluate the continuous extension (the book's eq. 7.28) of ``count`` steps at ``t`` (m,) into ``out`` (n, m).
+    """Evaluate the continuous extension of ``count`` steps at ``t`` (m,) into ``out`` (n, m).
 
     Outside the steps the first or last piece is continued.
     """
@@ -405,11 +377,11 @@ def interpolate(times, states, pieces, count, t, out):  # type: ignore[no-untype
             )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@_jit
 def run(  # type: ignore[no-untyped-def]
     address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces, t_eval, out
 ):
-    """Integrate to the bound in one compiled loop, sampling at increasing ``t_eval`` (m,) into ``out`` (n, m).
+    """Integrate to the bound in one compiled loop; sample at increasing ``t_eval`` (m,) into ``out`` (n, m).
 
     Returns the last status of ``advance``.
     """

@@ -1,6 +1,6 @@
 """The default method: RODAS in compiled blocks of steps, as a SciPy ``OdeSolver`` (imports SciPy and numba).
 
-The method and its sources are in ``hdsim.simulation._rosenbrock``; ``docs/integration.md`` says when to use it.
+The method and its sources are in ``hdsim.simulation._rosenbrock``; when to use it in ``docs/integration.md``.
 """
 
 from __future__ import annotations
@@ -88,12 +88,12 @@ class _Block:
 
 
 class Rodas4(OdeSolver):  # type: ignore[misc]
-    """RODAS (Hairer & Wanner 1996, IV.7): Rosenbrock method of order 4(3), L-stable, for stiff and smooth systems.
+    """RODAS (Hairer & Wanner 1996, IV.7): L-stable Rosenbrock method of order 4(3).
 
-    Use it as ``solve_ivp(system.rhs, (t0, t1), y0, method=Rodas4, system=system)``. One call of ``step`` takes
-    up to ``steps_per_call`` accepted steps; ``t_old`` and ``t`` are then the ends of that block, and
-    ``dense_output`` spans it. ``solve_ivp`` looks for events, and without ``t_eval`` returns points, at the ends
-    of blocks only: with events set ``steps_per_call=1``, which is stock behaviour.
+    Use it as ``solve_ivp(system.rhs, (t0, t1), y0, method=Rodas4, system=system)``. One call of ``step``
+    takes up to ``steps_per_call`` accepted steps; ``t_old`` and ``t`` are then the ends of that block, and
+    ``dense_output`` spans it. ``solve_ivp`` looks for events, and without ``t_eval`` returns points, at the
+    ends of blocks only: with events set ``steps_per_call=1``, which is stock behaviour.
 
     A failing step leaves what the block did before it: that is delivered first, the next ``step`` fails.
 
@@ -106,8 +106,8 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
         system: the compiled system.
         rtol: relative tolerance.
         atol: absolute tolerance, a number or shape (n,).
-        first_step: size of the first step; chosen when None. Longer than the span is allowed, and remembered in
-            ``next_step``: spans between discontinuities can be shorter than a step.
+        first_step: size of the first step; chosen when None. Longer than the span is allowed, and remembered
+            in ``next_step``: spans between discontinuities can be shorter than a step.
         max_step: largest step.
         steps_per_call: accepted steps in one block.
 
@@ -120,6 +120,8 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
         ValueError: an argument is out of its range.
     """
 
+    t: float
+    y: Array
     steps = 0
     rejected = 0
     suspect: int | None = None

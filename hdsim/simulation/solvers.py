@@ -30,7 +30,7 @@ class Method:
         module: where its ``OdeSolver`` class lives; imported on first use.
         class_name: name of that class.
         jacobian: whether it takes the Jacobian as the option ``jac``.
-        one_step: whether it starts afresh at each step, so that the last step size of a span suits the next one.
+        one_step: whether each step starts afresh, so that the last step size of a span suits the next one.
         compiled: whether it calls the system's kernel itself, by the option ``system``.
         summary: one line for the user.
     """
@@ -75,7 +75,7 @@ _NOT_FINITE_IN_A_ROW = 500
 class Statistics:
     """Work done: evaluations of the right-hand side and the Jacobian, LU decompositions, steps.
 
-    ``rejected`` is known for ``rodas4`` only (else 0). ``steps`` of the others is the number of accepted steps too.
+    ``steps`` are the accepted ones; ``rejected`` is known for ``rodas4`` only (else 0).
     """
 
     nfev: int = 0
@@ -190,7 +190,7 @@ def _watched(method: str) -> type:
 
 def _planned_step(solver: Any) -> float:
     """Size of the step that a solver plans; 0 when it does not say so."""
-    step = getattr(solver, "next_step", None) or getattr(solver, "h_abs", 0.0)
+    step: float = getattr(solver, "next_step", 0.0) or getattr(solver, "h_abs", 0.0)
     return float(step) if 0.0 < step < math.inf else 0.0
 
 

@@ -1,8 +1,8 @@
 """Initial-value problems with known solutions, as system kernels: every method is checked on every one.
 
-Each class has ``name``, ``t_end`` (s), ``system()`` and ``exact(t)`` -> states (n, m). ``system().scale`` is the
-size of each state, so the error that counts is ``abs(y - exact) / scale``. ``smooth`` is False where the
-right-hand side has kinks: there no method keeps its order, the error control alone keeps the tolerance.
+Each class has ``name``, ``t_end`` (s), ``system()`` and ``exact(t)`` -> states (n, m). ``system().scale``
+is the size of each state, so the error that counts is ``abs(y - exact) / scale``. ``smooth`` is False where
+the right-hand side has kinks: there no method keeps its order, the error control alone keeps the tolerance.
 """
 
 import math
@@ -166,7 +166,7 @@ def _duffing(t, y, integers, reals, scratch, want, dy, jacobian, dfdt):
 
 
 class Duffing:
-    """Mass on a hardening cubic spring, from rest at ``amplitude``: x = A cn(w t | m), Abramowitz & Stegun ch. 16.
+    """Mass on a hardening cubic spring, from rest at A: x = A cn(w t | m), Abramowitz & Stegun ch. 16.
 
     w^2 = a + b A^2, m = b A^2 / (2 w^2). The work of the spring is the kinetic energy, a quadrature.
     """
@@ -206,8 +206,8 @@ def _coulomb_tanh(t, y, integers, reals, scratch, want, dy, jacobian, dfdt):
 class CoulombStop:
     """A body slowed down by friction a tanh(v / s) until it stands: sinh(v / s) = sinh(v0 / s) exp(-a t / s).
 
-    This, and not the corner of the sign function, is the exact solution of what is integrated. The angle is its
-    integral, by adaptive quadrature. The limit s -> 0 is ``CoulombCorner``.
+    This, and not the corner of the sign function, is the exact solution of what is integrated. The angle is
+    its integral, by adaptive quadrature. The limit s -> 0 is ``CoulombCorner``.
     """
 
     name = "Coulomb stop (tanh)"
@@ -314,7 +314,7 @@ class ForcedBacklash:
                 if len(crossing):
                     i = crossing[0]
                     root = brentq(
-                        lambda s, f=flank: piece(s)[0] - f, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15
+                        lambda s, f=flank, x=piece: x(s)[0] - f, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15
                     )
                     if end is None or root < end[0]:
                         end = root, flank
