@@ -98,11 +98,11 @@ TPI = Source(
     "Schaeffler TPI 275, series RT1-H-CS, i = 100, 20 °C; zhulu248/harmonic-drive-twin catalogue.py", "copied"
 )
 CPL = Source(
-    "Harmonic Drive AG, CPL20-2A, no-load running torque at 3500 rpm, 20 °C; geez0x1/CompliantJointToolbox",
+    "Harmonic Drive AG, CPL20-2A, 3500 rpm, 20 °C; geez0x1/CompliantJointToolbox, early param/CE_Med_ds.m",
     "copied",
 )
 TPI_RADIUS = Source("Schaeffler TPI 275, pitch radius; zhulu248/harmonic-drive-twin catalogue.py", "copied")
-RATCHETING = Source("Harmonic Drive LLC, CSF/CSG component sets and gear units catalogue, p. 14", "read")
+RATCHETING = Source("Harmonic Drive LLC, CSF/CSG catalogue, p. 14, not re-read", "quoted")
 INERTIA_COMPONENT = Source(
     "Harmonic Drive LLC, CSF rating table, moment of inertia; row copied in a public table-extraction test",
     "copied",
