@@ -1,0 +1,114 @@
+"""The one kernel behind every signal: pieces in time, each a cubic, a sum of sines, a chirp or a triangle.
+
+Packed parameters: ``n``, the value before the first piece, then four tables of n numbers (start of the
+piece in s; first and last piece of the smooth run that it belongs to; position of its record), then the
+records: kind, followed by the numbers listed at each kind below. Times in a record count from the
+piece's start.
+
+The run is chosen by ``inside``, the piece within the run by ``time``: a solver that looks a little over
+the end of its span sees the current run continued, and a span may cross joints without a jump.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hdsim.kernel import signal
+
+CUBIC = 0  #: c0, c1, c2, c3: value sum c_k t^k
+SINES = 1  #: offset, count, then (amplitude, rad/s, phase) each
+LINEAR_CHIRP = 2  #: offset, amplitude, rad/s at the start, rad/s^2, phase
+EXPONENTIAL_CHIRP = 3  #: offset, amplitude, rad/s at the start, growth rate in 1/s, phase
+TRIANGLE = 4  #: offset, amplitude, frequency in Hz; rises from the offset
+
+#: Numbers before the tables.
+HEADER = 2
+
+
+@signal
+def pieces(time: float, inside: float, parameters: Any, values: Any) -> None:
+    """Value and three derivatives at ``time`` of the smooth run that holds ``inside``."""
+    n = int(parameters[0])
+    if inside < parameters[2]:
+        values[0] = parameters[1]
+        values[1] = 0.0
+        values[2] = 0.0
+        values[3] = 0.0
+        return
+    low = 0
+    high = n
+    while high - low > 1:
+        middle = (low + high) // 2
+        if parameters[2 + middle] <= inside:
+            low = middle
+        else:
+            high = middle
+    first = int(parameters[2 + n + low])
+    last = int(parameters[2 + 2 * n + low])
+    if last > first:
+        low = first
+        high = last + 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            if parameters[2 + middle] <= time:
+                low = middle
+            else:
+                high = middle
+    start = parameters[2 + low]
+    at = int(parameters[2 + 3 * n + low])
+    kind = int(parameters[at])
+    t = time - start
+    if kind == CUBIC:
+        c1 = parameters[at + 2]
+        c2 = parameters[at + 3]
+        c3 = parameters[at + 4]
+        values[0] = parameters[at + 1] + t * (c1 + t * (c2 + t * c3))
+        values[1] = c1 + t * (2.0 * c2 + t * 3.0 * c3)
+        values[2] = 2.0 * c2 + 6.0 * c3 * t
+        values[3] = 6.0 * c3
+        return
+    values[0] = parameters[at + 1]
+    values[1] = 0.0
+    values[2] = 0.0
+    values[3] = 0.0
+    if kind == SINES:
+        for k in range(int(parameters[at + 2])):
+            amplitude = parameters[at + 3 + 3 * k]
+            omega = parameters[at + 4 + 3 * k]
+            phi = omega * t + parameters[at + 5 + 3 * k]
+            sine = amplitude * math.sin(phi)
+            cosine = amplitude * math.cos(phi)
+            values[0] += sine
+            values[1] += omega * cosine
+            values[2] -= omega * omega * sine
+            values[3] -= omega * omega * omega * cosine
+    elif kind == TRIANGLE:
+        amplitude = parameters[at + 2]
+        frequency = parameters[at + 3]
+        half = math.floor(2.0 * frequency * (inside - start) + 0.5)
+        if half % 2 != 0:
+            amplitude = -amplitude
+        values[0] += amplitude * (4.0 * frequency * t - 2.0 * half)
+        values[1] = 4.0 * frequency * amplitude
+    else:
+        amplitude = parameters[at + 2]
+        omega = parameters[at + 3]
+        rate = parameters[at + 4]
+        phi = parameters[at + 5]
+        if kind == LINEAR_CHIRP:
+            phi += t * (omega + 0.5 * rate * t)
+            phi1 = omega + rate * t
+            phi2 = rate
+            phi3 = 0.0
+        else:
+            phi += omega * math.expm1(rate * t) / rate
+            phi1 = omega * math.exp(rate * t)
+            phi2 = rate * phi1
+            phi3 = rate * phi2
+        sine = amplitude * math.sin(phi)
+        cosine = amplitude * math.cos(phi)
+        values[0] += sine
+        values[1] = cosine * phi1
+        values[2] = cosine * phi2 - sine * phi1 * phi1
+        values[3] = cosine * (phi3 - phi1 * phi1 * phi1) - 3.0 * sine * phi1 * phi2

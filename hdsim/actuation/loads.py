@@ -1,0 +1,59 @@
+"""The ``load`` section of a scenario: what hangs on the output."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from hdsim.actuation._kernels import gravity_arm, load_torque
+from hdsim.actuation.signals import TorqueSignal
+from hdsim.parts import Builder, Part
+
+#: Standard acceleration of free fall, m/s^2 (ISO 80000-3).
+STANDARD_GRAVITY = 9.80665
+
+
+class GravityArm(Part):
+    """A mass on an arm in the field of gravity: torque -m g l sin(theta - theta_0) on the output.
+
+    theta_0 is the angle at which the arm hangs; its energy m g l (1 - cos(theta - theta_0)) counts from
+    there. The arm's inertia belongs to the load's ``inertia_kg_m2``.
+    """
+
+    mass_kg: float = Field(gt=0.0)
+    """Mass of the arm with what it carries. Unit kg."""
+    centre_of_mass_m: float = Field(gt=0.0)
+    """Distance of the centre of mass from the output's axis. Unit m."""
+    hanging_angle_deg: float = 0.0
+    """Output angle at which the arm hangs straight down; -90 puts the arm level at angle 0. Unit deg."""
+    gravity_m_per_s2: float = Field(STANDARD_GRAVITY, gt=0.0)
+    """Acceleration of free fall, times the sine of the axis' inclination to the vertical. Unit m/s^2."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the torque of gravity and its energy."""
+        moment = self.mass_kg * self.gravity_m_per_s2 * self.centre_of_mass_m
+        build.element(gravity_arm, [moment, math.radians(self.hanging_angle_deg)])
+
+
+class Load(Part):
+    """What hangs on the output."""
+
+    inertia_kg_m2: float = Field(gt=0.0)
+    """Moment of inertia about the output's axis. Unit kg m^2."""
+    torque: TorqueSignal | None = None
+    """External torque on the output over time, positive in the direction of positive output angle."""
+    gravity: GravityArm | None = None
+    """A mass on an arm."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the external torque and gravity; the inertia is the assembly's to read."""
+        if self.torque is not None:
+            build.element(load_torque, [build.signal(self.torque.data)])
+        if self.gravity is not None:
+            self.gravity.contribute(build)
+
+    @property
+    def end_time(self) -> float:
+        """Time in s after which the external torque is constant; infinite when it never is."""
+        return 0.0 if self.torque is None else self.torque.end_time
