@@ -1,0 +1,75 @@
+"""A damaged tooth: a short error each time that a lobe of the wave generator passes it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field
+
+from hdsim.effects._kernels import ARCMIN
+from hdsim.kernel import twist
+from hdsim.parts import Builder, Effect, Signature
+
+
+@twist
+def bump(motor_angle: float, output_angle: float, parameters: Any, error: Any) -> None:
+    """Add e = A exp(kappa (cos u - 1)), u = n (theta_m - c theta_l - a). Parameters: A, n, kappa, a, c."""
+    n = parameters[1]
+    kappa = parameters[2]
+    c = parameters[4]
+    u = n * (motor_angle - c * output_angle - parameters[3])
+    sine = math.sin(u)
+    value = parameters[0] * math.exp(kappa * (math.cos(u) - 1.0))
+    first = -n * kappa * sine * value
+    second = n * n * value * (kappa * kappa * sine * sine - kappa * math.cos(u))
+    error[0] += value
+    error[1] += first
+    error[2] -= c * first
+    error[3] += second
+    error[4] -= c * second
+    error[5] += c * c * second
+
+
+class DamagedTooth(Effect):
+    """e = A exp((cos n u - 1)/(n s)^2), a periodic bump of standard deviation s over u.
+
+    u is the wave generator's angle against the member with the damage, measured from it; n = 2 lobes pass
+    the tooth in each turn. The shape is a von Mises bump: the smooth periodic form of a Gaussian.
+    """
+
+    title: ClassVar[str] = "local tooth damage"
+    source: ClassVar[str] = (
+        "phenomenological: von Mises bump (Mardia and Jupp 2000, Directional Statistics, 3.5.4); passing "
+        "rate from the kinematics; amplitude and width are estimates"
+    )
+    signature: ClassVar[Signature] = Signature(
+        lives_in=("wave_generator_angle", "output_angle"),
+        channels=("output_angle", "motor_torque", "output_torque"),
+        orders=(2.02, 4.04, 6.06),
+        confused_with={
+            "kinematic_error": "a few smooth harmonics over the whole turn instead of many in a narrow "
+            "range of angle",
+            "sensors": "a fault of an encoder's disc repeats once per turn of its own shaft and leaves no "
+            "torque",
+        },
+    )
+
+    amplitude_arcmin: float = -0.2
+    """Height of the bump as an angle at the output, arcmin (negative: material is missing)."""
+    width_deg: float = Field(8.0, gt=0, le=60)
+    """Standard deviation s of the bump, degrees of the wave generator."""
+    position_deg: float = 0.0
+    """Angle of the wave generator, at zero output angle, at which lobe 1 is on the tooth, degrees."""
+    member: Literal["output", "fixed"] = "output"
+    """The spline that has the damage: the one that turns with the output, or the fixed one."""
+    passes_per_turn: int = Field(2, ge=1, le=2)
+    """Lobes that feel the damage in one turn of the wave generator against the member."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the bump to the mesh twist."""
+        n = self.passes_per_turn
+        kappa = 1.0 / (n * math.radians(self.width_deg)) ** 2
+        moves = 1.0 if self.member == "output" else 0.0
+        numbers = [self.amplitude_arcmin * ARCMIN, float(n), kappa, math.radians(self.position_deg), moves]
+        build.twist(bump, numbers)

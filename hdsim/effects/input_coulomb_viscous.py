@@ -1,0 +1,50 @@
+"""Coulomb and viscous friction on the motor shaft, on top of the drive's own."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field
+
+from hdsim.effects._kernels import coulomb_viscous
+from hdsim.kernel import MOTOR_TORQUE
+from hdsim.parts import Builder, Effect, Signature
+
+
+class InputCoulombViscous(Effect):
+    """T = -(T_c tanh(w_m/w_s) + b w_m) on the motor: bearings, seal and gearing before the wave generator."""
+
+    title: ClassVar[str] = "Coulomb and viscous friction, input"
+    source: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30:1083; level fitted to the "
+        "starting torque of 37 mN m and no-load running torques of 105 and 160 mN m at 2000 and 3500 rpm of"
+        " a size 20 drive"
+    )
+    signature: ClassVar[Signature] = Signature(
+        lives_in=("velocity", "direction"),
+        channels=("motor_torque",),
+        confused_with={
+            "load_side_friction": "reaches the motor divided by the ratio and winds the drive up on the way",
+            "thermal_friction": "decays over minutes at constant speed; Coulomb and viscous friction do not",
+            "load_dependent_loss": "the offset between the directions grows with the load",
+            "torsional_hysteresis_maxwell": "a cycle with the wave generator locked excludes friction on "
+            "the input",
+        },
+    )
+
+    coulomb_nm: float = Field(0.032, ge=0)
+    """Coulomb friction T_c at the motor shaft, N m."""
+    viscous_nm_s_per_rad: float = Field(3.5e-4, ge=0)
+    """Viscous friction b at the motor shaft, N m s/rad."""
+    smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
+    """Motor speed w_s over which the sign is smoothed, rad/s."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the friction torque to the motor."""
+        numbers = [
+            MOTOR_TORQUE,
+            self.coulomb_nm,
+            self.viscous_nm_s_per_rad,
+            self.smoothing_velocity_rad_per_s,
+        ]
+        build.element(coulomb_viscous, numbers)

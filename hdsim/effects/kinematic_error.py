@@ -1,0 +1,99 @@
+"""Kinematic error: the output of the unloaded drive differs from motor angle over ratio, periodically."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from hdsim.effects._kernels import ARCMIN, harmonics
+from hdsim.parts import Builder, Effect, Parameters, Signature
+
+Turn = Literal["wave_generator_turn", "output_turn", "relative_turn"]
+
+
+class ErrorComponent(Parameters):
+    """One harmonic of the kinematic error."""
+
+    order: float = Field(gt=0)
+    """Periods per turn of ``per``."""
+    amplitude_arcmin: float | None = Field(None, ge=0)
+    """Amplitude (half of peak to peak) as an angle at the output, arcmin."""
+    amplitude_rad: float | None = Field(None, ge=0)
+    """The same in rad; give one of the two."""
+    phase_deg: float = 0.0
+    """Phase at zero angle, degrees."""
+    per: Turn = "wave_generator_turn"
+    """What ``order`` counts: turns of the wave generator (errors of the fixed member), of the output (its own
+    eccentricity), or of the wave generator against the output member (errors of the turning member)."""
+
+    @model_validator(mode="after")
+    def _one_amplitude(self) -> ErrorComponent:
+        if (self.amplitude_arcmin is None) == (self.amplitude_rad is None):
+            raise ValueError("give exactly one of amplitude_arcmin and amplitude_rad")
+        return self
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude in rad."""
+        return (self.amplitude_rad or 0.0) + (self.amplitude_arcmin or 0.0) * ARCMIN
+
+
+def _default_components() -> tuple[ErrorComponent, ...]:
+    table: tuple[tuple[float, float, Turn], ...] = (
+        (2, 0.20, "wave_generator_turn"),
+        (2, 0.10, "relative_turn"),
+        (4, 0.05, "wave_generator_turn"),
+        (1, 0.03, "wave_generator_turn"),
+        (1, 0.12, "output_turn"),
+        (2, 0.04, "output_turn"),
+    )
+    return tuple(ErrorComponent(order=n, amplitude_arcmin=a, per=per) for n, a, per in table)
+
+
+class KinematicError(Effect):
+    """e = sum A sin(order * angle + phase), added to the mesh twist theta_m/i - theta_f + e.
+
+    The builder derives the reaction torques from e: the motor feels tau (1/i + de/dtheta_m), without which
+    the model would create energy (virtual work). With the circular spline fixed the orders per
+    wave-generator turn of an order-2 ``relative_turn`` component are 2 z_c/z_f (2.02 at ratio 100), and an
+    order-1 ``output_turn`` component is 1/ratio (0.01). The default components sum to the catalogue's
+    transmission accuracy of about 1 arcmin peak to peak.
+    """
+
+    title: ClassVar[str] = "kinematic error"
+    source: ClassVar[str] = (
+        "Tuttle and Seering 1996, IEEE Trans. Robotics and Automation 12:368 (form); Ghorbel, Gandhi and "
+        "Alpeter 2001, J. Mech. Des. 123:90 (pure kinematic error); level: Harmonic Drive catalogue, "
+        "angular transmission accuracy; the split over orders is an estimate"
+    )
+    signature: ClassVar[Signature] = Signature(
+        lives_in=("wave_generator_angle", "output_angle"),
+        channels=("output_angle", "motor_torque", "output_torque"),
+        orders=(2.0, 2.02, 4.0, 1.0, 0.01, 0.02),
+        confused_with={
+            "motor_torque_ripple": "ripple moves both encoders alike (no quasi-static transmission error) "
+            "and its order is locked to poles and slots; under a stiff speed loop it"
+            " shows only in the current, constant with speed, while this one grows "
+            "there with speed squared",
+            "wave_generator_eccentricity": "only order 1 per wave-generator turn, no order 2",
+            "output_eccentricity": "only order 1 per output turn",
+            "sensors": "encoder eccentricity stays with the encoder when it is re-clocked; two opposed "
+            "heads cancel odd orders; on the motor it reaches the transmission error divided by "
+            "the ratio",
+            "damaged_tooth": "a short bump: many harmonics of one pass, in a narrow range of angle",
+        },
+    )
+
+    components: tuple[ErrorComponent, ...] = Field(default_factory=_default_components, min_length=1)
+    """The harmonics."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the harmonics to the mesh twist."""
+        numbers = [float(len(self.components))]
+        for c in self.components:
+            motor = 0.0 if c.per == "output_turn" else c.order
+            output = {"wave_generator_turn": 0.0, "output_turn": c.order, "relative_turn": -c.order}[c.per]
+            numbers += [c.amplitude, motor, output, math.radians(c.phase_deg)]
+        build.twist(harmonics, numbers)

@@ -1,0 +1,41 @@
+"""Eccentricity of the output member: an error once per output turn."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from pydantic import Field
+
+from hdsim.effects._kernels import harmonics
+from hdsim.parts import Builder, Effect, Signature
+
+
+class OutputEccentricity(Effect):
+    """e = (d / r) sin(theta_l + phase): run-out d of the output's coupling circle of radius r."""
+
+    title: ClassVar[str] = "output eccentricity"
+    source: ClassVar[str] = "first-order kinematics of an eccentric circle (angle d/r); 10 um is an estimate"
+    signature: ClassVar[Signature] = Signature(
+        lives_in=("output_angle",),
+        channels=("output_angle",),
+        orders=(0.01,),
+        confused_with={
+            "sensors": "an eccentric output encoder gives the same order: it moves with the encoder when "
+            "re-clocked and two opposed heads cancel it, with no torque",
+            "unbalance": "an unbalance at the output scales with gravity and shows in the motor torque",
+            "kinematic_error": "its order 1 per output turn is the same trace: one of the two is enough",
+        },
+    )
+
+    eccentricity_um: float = Field(2.0, ge=0)
+    """Run-out (offset of the centres) d, um."""
+    radius_mm: float = Field(25.0, gt=0)
+    """Radius r on which the torque passes to the output, mm."""
+    phase_deg: float = 0.0
+    """Phase at zero output angle, degrees."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add order 1 per output turn to the mesh twist."""
+        amplitude = self.eccentricity_um * 1e-3 / self.radius_mm
+        build.twist(harmonics, [1.0, amplitude, 0.0, 1.0, math.radians(self.phase_deg)])

@@ -1,0 +1,61 @@
+"""Stribeck friction: static friction above Coulomb, decaying with speed as the lubricant film builds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, element
+from hdsim.parts import Builder, Effect, Signature
+
+
+@element
+def stribeck(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
+    """T = -dT exp(-(w/v_s)^2) tanh(w/w_s) on the motor. Parameters: dT, v_s, w_s."""
+    speed = inputs[MOTOR_VELOCITY]
+    scaled = speed / parameters[1]
+    level = parameters[0] * math.exp(-scaled * scaled)
+    sign = math.tanh(speed / parameters[2])
+    torque = level * sign
+    slope = level * ((1.0 - sign * sign) / parameters[2] - 2.0 * scaled / parameters[1] * sign)
+    outputs[MOTOR_TORQUE] -= torque
+    jacobian[MOTOR_TORQUE * columns + MOTOR_VELOCITY] -= slope
+    outputs[DISSIPATED] += torque * speed
+    jacobian[DISSIPATED * columns + MOTOR_VELOCITY] += torque + slope * speed
+    outputs[INPUT_FRICTION] -= torque
+
+
+class StribeckFriction(Effect):
+    """T = -(T_s - T_c) exp(-(w_m/v_s)^2) tanh(w_m/w_s), on top of the drive's Coulomb friction T_c."""
+
+    title: ClassVar[str] = "Stribeck friction"
+    source: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30:1083 (Gaussian form of Tustin's "
+        "curve); v_s of 1-10 rad/s and T_s/T_c of 1-1.5 are estimates"
+    )
+    signature: ClassVar[Signature] = Signature(
+        lives_in=("velocity", "direction"),
+        channels=("motor_torque", "output_angle"),
+        confused_with={
+            "lugre_friction": "a function of speed alone: no presliding displacement and no lag after a "
+            "change of speed",
+            "input_coulomb_viscous": "friction there never falls with speed, so slow motion does not stick "
+            "and slip",
+        },
+    )
+
+    extra_static_nm: float = Field(0.008, ge=0)
+    """Static minus Coulomb friction at the motor shaft, T_s - T_c, N m."""
+    stribeck_velocity_rad_per_s: float = Field(5.0, gt=0)
+    """Motor speed v_s over which the extra friction decays, rad/s."""
+    smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
+    """Motor speed w_s over which the sign is smoothed, rad/s; well below v_s, or the bump is lost."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the bump to the motor's friction."""
+        build.element(
+            stribeck,
+            [self.extra_static_nm, self.stribeck_velocity_rad_per_s, self.smoothing_velocity_rad_per_s],
+        )

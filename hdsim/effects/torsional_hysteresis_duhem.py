@@ -1,0 +1,69 @@
+"""Torsional hysteresis as a Duhem equation, parallel to the torsion spring."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
+from hdsim.parts import Builder, Effect, Signature, State
+
+
+@element
+def duhem(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
+    """Hysteresis torque on the twist. Parameters: A, alpha; own state: z, N m."""
+    stiffness = parameters[0]
+    decay = parameters[1]
+    speed = inputs[TWIST_RATE]
+    z = inputs[own]
+    magnitude = abs(speed)
+    direction = -1.0 if speed < 0.0 else 1.0
+    heat = decay * z * z / stiffness
+    outputs[TWIST_TORQUE] -= z
+    jacobian[TWIST_TORQUE * columns + own] -= 1.0
+    outputs[own] += stiffness * speed - decay * magnitude * z
+    jacobian[own * columns + TWIST_RATE] += stiffness - decay * direction * z
+    jacobian[own * columns + own] -= decay * magnitude
+    outputs[DISSIPATED] += heat * magnitude
+    jacobian[DISSIPATED * columns + TWIST_RATE] += heat * direction
+    jacobian[DISSIPATED * columns + own] += 2.0 * decay * z / stiffness * magnitude
+    outputs[STORED] += 0.5 * z * z / stiffness
+
+
+class TorsionalHysteresisDuhem(Effect):
+    """tau = z, z' = A w - alpha |w| z, w the rate of twist; |z| saturates at A/alpha.
+
+    Rate-independent: on a branch z approaches the saturation exponentially over the twist 1/alpha. It stores
+    z^2/(2 A), the rest, alpha |w| z^2 / A, is heat.
+    """
+
+    title: ClassVar[str] = "torsional hysteresis (Duhem)"
+    source: ClassVar[str] = (
+        "Dhaouadi, Ghorbel and Gandhi 2003, IEEE Trans. Industrial Electronics 50:1165; level as for "
+        "Maxwell slip"
+    )
+    signature: ClassVar[Signature] = Signature(
+        lives_in=("torque", "time_since_reversal", "direction"),
+        channels=("output_angle", "output_torque"),
+        confused_with={
+            "torsional_hysteresis_maxwell": "nested branches with return to the point of reversal; this one"
+            " has a single exponential and minor loops that drift",
+            "output_backlash": "backlash has no stiffness over a fixed gap, no loss in it, and vanishes "
+            "under a bias",
+            "input_coulomb_viscous": "absent with the wave generator locked",
+        },
+    )
+
+    stiffness_nm_per_rad: float = Field(5000.0, gt=0)
+    """Stiffness A at a reversal from rest, N m/rad."""
+    saturation_torque_nm: float = Field(2.0, gt=0)
+    """Torque A/alpha at which z saturates, N m: half of the loop's width in torque."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the hysteresis torque parallel to the torsion spring."""
+        decay = self.stiffness_nm_per_rad / self.saturation_torque_nm
+        state = State(
+            "hysteresis_torque", "N m", 0.0, self.saturation_torque_nm, "torque of the Duhem hysteresis"
+        )
+        build.element(duhem, [self.stiffness_nm_per_rad, decay], states=(state,))

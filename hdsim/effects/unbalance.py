@@ -1,0 +1,65 @@
+"""Unbalanced masses under gravity, at the output and at the motor."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from hdsim.kernel import MOTOR_TORQUE, OUTPUT_TORQUE, STORED, element
+from hdsim.parts import Builder, Effect, Signature
+
+STANDARD_GRAVITY = 9.80665  #: m/s^2
+
+
+@element
+def weight(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
+    """T = -m g r cos(theta + phi). Parameters: body (row of its torque), m g r, phi."""
+    row = int(parameters[0])
+    column = 2 * row
+    angle = inputs[column] + parameters[2]
+    outputs[row] -= parameters[1] * math.cos(angle)
+    jacobian[row * columns + column] += parameters[1] * math.sin(angle)
+    outputs[STORED] += parameters[1] * math.sin(angle)
+
+
+class Unbalance(Effect):
+    """T = -m g r cos(theta + phi), from the potential m g r sin(theta + phi); the axis is horizontal.
+
+    ``m r`` is the static unbalance. The inertia m r^2 belongs to the load's and the motor's inertia.
+    """
+
+    title: ClassVar[str] = "unbalance"
+    source: ClassVar[str] = "statics of a rigid body under gravity; default of the output: 1 kg at 0.1 m"
+    signature: ClassVar[Signature] = Signature(
+        lives_in=("output_angle", "wave_generator_angle"),
+        channels=("motor_torque", "output_torque", "output_angle"),
+        orders=(0.01, 1.0),
+        confused_with={
+            "output_eccentricity": "kinematic: shows in the output angle without torque",
+            "wave_generator_eccentricity": "kinematic: its torque grows with the load, an unbalance's does "
+            "not",
+            "sensors": "an eccentric encoder leaves no torque",
+        },
+    )
+
+    output_kg_m: float = Field(0.1, ge=0)
+    """Static unbalance m r at the output, kg m."""
+    output_phase_deg: float = 0.0
+    """Elevation of the output's centre of mass above the horizontal at zero output angle, degrees."""
+    motor_kg_m: float = Field(0.0, ge=0)
+    """Static unbalance m r of the motor's rotor and wave generator, kg m."""
+    motor_phase_deg: float = 0.0
+    """Elevation of the rotor's centre of mass above the horizontal at zero motor angle, degrees."""
+    gravity_m_per_s2: float = Field(STANDARD_GRAVITY, ge=0)
+    """Component of gravity across the axis of rotation, m/s^2 (0: vertical axis)."""
+
+    def contribute(self, build: Builder) -> None:
+        """Add the weight's torque on output and motor."""
+        for row, moment, phase in (
+            (OUTPUT_TORQUE, self.output_kg_m, self.output_phase_deg),
+            (MOTOR_TORQUE, self.motor_kg_m, self.motor_phase_deg),
+        ):
+            if moment > 0:
+                build.element(weight, [row, moment * self.gravity_m_per_s2, math.radians(phase)])

@@ -1,0 +1,161 @@
+"""A drive-less model: collects what effects contribute and calls their kernels as the assembly does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hdsim._abi import call_element, call_twist
+from hdsim.kernel import (
+    DISSIPATED,
+    INPUT_FRICTION,
+    MOTOR_TORQUE,
+    MOTOR_VELOCITY,
+    OWN,
+    STORED,
+    Kernel,
+    element,
+)
+from hdsim.parts import Effect, State
+
+#: Rows of the outputs whose derivatives the contract asks for, own rates aside.
+SMOOTH_ROWS = [row for row in range(OWN) if row < STORED]
+assert STORED == 8
+assert INPUT_FRICTION > STORED
+
+
+@element
+def base_friction(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
+    """The drive's own viscous friction. Parameter: b."""
+    speed = inputs[MOTOR_VELOCITY]
+    outputs[MOTOR_TORQUE] -= parameters[0] * speed
+    jacobian[MOTOR_TORQUE * columns + MOTOR_VELOCITY] -= parameters[0]
+    outputs[DISSIPATED] += parameters[0] * speed * speed
+    jacobian[DISSIPATED * columns + MOTOR_VELOCITY] += 2.0 * parameters[0] * speed
+
+
+@njit(cache=True)
+def _elements(addresses, offsets, owns, numbers, columns, inputs, outputs, jacobian):
+    for i in range(len(addresses)):
+        call_element(addresses[i], inputs, numbers[offsets[i] :], owns[i], columns, outputs, jacobian)
+
+
+@njit(cache=True)
+def _twists(addresses, offsets, numbers, motor_angle, output_angle, error):
+    for i in range(len(addresses)):
+        call_twist(addresses[i], motor_angle, output_angle, numbers[offsets[i] :], error)
+
+
+class FakeBuilder:
+    """Implements ``hdsim.parts.Builder`` as a list."""
+
+    def __init__(self, ratio: float = -100.0, seed: int = 1, viscous: float = 3.5e-4) -> None:
+        self.ratio = ratio
+        self.rated_torque_nm = 52.0
+        self.viscous_friction_nm_s_per_rad = viscous
+        self.seed = seed
+        self.first: list[tuple[Kernel, list[float], int]] = []
+        self.last: list[tuple[Kernel, list[float], int]] = []
+        self.twists: list[tuple[Kernel, list[float]]] = []
+        self.states: list[State] = []
+        self.compliances: list[Callable[[Any], Any]] = []
+        self.half_gap = 0.0
+        self.sensors: dict[str, Any] = {}
+
+    def element(
+        self, kernel: Kernel, parameters: Any, *, states: Sequence[State] = (), last: bool = False
+    ) -> int:
+        own = OWN + len(self.states)
+        self.states += states
+        (self.last if last else self.first).append((kernel, [float(p) for p in parameters], own))
+        return own
+
+    def twist(self, kernel: Kernel, parameters: Any) -> None:
+        self.twists.append((kernel, [float(p) for p in parameters]))
+
+    def series_compliance(self, wind_up: Callable[[Any], Any]) -> None:
+        self.compliances.append(wind_up)
+
+    def widen_gap(self, half_gap_rad: float) -> None:
+        self.half_gap += half_gap_rad
+
+    def signal(self, signal: Any) -> int:
+        raise NotImplementedError
+
+    def state_index(self, name: str) -> int | None:
+        return next((OWN + i for i, state in enumerate(self.states) if state.name == name), None)
+
+    def sensor(self, channel: str, sensor: Any) -> None:
+        self.sensors[channel] = sensor
+
+
+class Model:
+    """The kernels of some effects, callable."""
+
+    def __init__(self, *effects: Effect, base: float = 0.0, **options: Any) -> None:
+        self.builder = build = FakeBuilder(viscous=base, **options)
+        build.element(base_friction, [base])
+        for effect in effects:
+            effect.contribute(build)
+        self.columns = OWN + len(build.states)
+        parts = build.first + build.last
+        self._elements = self._packed([(kernel, numbers) for kernel, numbers, _ in parts])
+        self._owns = np.array([own for _, _, own in parts])
+        self._twists = self._packed(build.twists)
+
+    @staticmethod
+    def _packed(parts: list[tuple[Kernel, list[float]]]) -> tuple[Any, Any, Any]:
+        addresses = np.array([kernel.address for kernel, _ in parts], dtype=np.int64)
+        lengths = [len(numbers) for _, numbers in parts]
+        offsets = np.concatenate(([0], np.cumsum(lengths)[:-1])).astype(np.int64)
+        return addresses, offsets, np.array([x for _, numbers in parts for x in numbers], dtype=float)
+
+    @property
+    def initial(self) -> np.ndarray:
+        """Inputs at rest, own states at their initial values."""
+        inputs = np.zeros(self.columns)
+        inputs[OWN:] = [state.initial for state in self.builder.states]
+        return inputs
+
+    def __call__(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs (columns,) and Jacobian (columns, columns)."""
+        outputs, jacobian = np.zeros(self.columns), np.zeros((self.columns, self.columns))
+        addresses, offsets, numbers = self._elements
+        flat = jacobian.reshape(-1)
+        _elements(addresses, offsets, self._owns, numbers, self.columns, inputs, outputs, flat)
+        return outputs, jacobian
+
+    def error(self, motor_angle: float, output_angle: float) -> np.ndarray:
+        """e, de/dm, de/do, d2e/dm2, d2e/dm do, d2e/do2."""
+        result = np.zeros(6)
+        addresses, offsets, numbers = self._twists
+        if len(addresses):
+            _twists(addresses, offsets, numbers, motor_angle, output_angle, result)
+        return result
+
+    def follow(self, column: int, position: Any, speed: Any, times: np.ndarray, rtol: float = 1e-9) -> Any:
+        """Own states, shape (states, n), while an angle column and its speed follow prescribed functions."""
+        from scipy.integrate import solve_ivp
+
+        def rate(t: float, own: np.ndarray) -> np.ndarray:
+            inputs = self.initial
+            inputs[column], inputs[column + 1], inputs[OWN:] = position(t), speed(t), own
+            return self(inputs)[0][OWN:]
+
+        scale = np.array([state.scale for state in self.builder.states])
+        step = (times[-1] - times[0]) / 500
+        solution = solve_ivp(
+            rate,
+            (times[0], times[-1]),
+            self.initial[OWN:],
+            "LSODA",
+            times,
+            rtol=rtol,
+            atol=rtol * scale,
+            max_step=step,
+        )
+        assert solution.success
+        return solution.y

@@ -1,0 +1,346 @@
+"""Each effect against something independent of it: closed forms, limits, quadrature, catalogue figures."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from harness import FakeBuilder, Model
+from pydantic import ValidationError
+from scipy.integrate import quad, solve_ivp
+
+import hdsim.kernel as k
+from hdsim.effects.base_flexibility import BaseFlexibility
+from hdsim.effects.damaged_tooth import DamagedTooth
+from hdsim.effects.flexspline_stiffening import FlexsplineStiffening
+from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
+from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
+from hdsim.effects.load_dependent_loss import LoadDependentLoss
+from hdsim.effects.load_side_friction import LoadSideFriction
+from hdsim.effects.lugre_friction import LugreFriction
+from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
+from hdsim.effects.output_backlash import OutputBacklash
+from hdsim.effects.output_eccentricity import OutputEccentricity
+from hdsim.effects.stiffness_nonlinearity import StiffnessNonlinearity
+from hdsim.effects.stribeck_friction import StribeckFriction
+from hdsim.effects.thermal_friction import ThermalFriction
+from hdsim.effects.torsional_hysteresis_duhem import TorsionalHysteresisDuhem
+from hdsim.effects.torsional_hysteresis_maxwell import SlipElement, TorsionalHysteresisMaxwell
+from hdsim.effects.unbalance import Unbalance
+from hdsim.effects.wave_generator_compliance import WaveGeneratorCompliance
+from hdsim.effects.wave_generator_eccentricity import WaveGeneratorEccentricity
+
+ARCMIN = math.radians(1 / 60)
+RATIO = -100.0
+
+
+def at(model: Model, **values: float) -> np.ndarray:
+    """Outputs of a model at the named inputs, e.g. ``MOTOR_VELOCITY=3``."""
+    inputs = model.initial
+    for name, value in values.items():
+        inputs[getattr(k, name)] = value
+    return model(inputs)[0]
+
+
+def test_default_kinematic_error_has_the_catalogues_accuracy_and_orders() -> None:
+    model = Model(KinematicError())
+    n = 20000
+    motor = np.arange(n) / n * 100 * 2 * math.pi  # one output turn without load
+    error = np.array([model.error(m, m / RATIO)[0] for m in motor])
+    assert 0.7 * ARCMIN < np.ptp(error) < 1.1 * ARCMIN
+    amplitude = 2 * np.abs(np.fft.rfft(error)) / n / ARCMIN  # bin = periods per output turn
+    found = {i: round(a, 3) for i, a in enumerate(amplitude) if a > 1e-6}
+    assert found == {1: 0.12, 2: 0.04, 100: 0.03, 200: 0.2, 202: 0.1, 400: 0.05}
+
+
+def test_kinematic_error_needs_exactly_one_amplitude() -> None:
+    for given in ({}, {"amplitude_rad": 1e-5, "amplitude_arcmin": 0.1}):
+        with pytest.raises(ValidationError, match="exactly one"):
+            ErrorComponent(order=2, **given)
+
+
+def test_wave_generator_eccentricity_equals_the_two_lobes_moment_balance() -> None:
+    effect = WaveGeneratorEccentricity(eccentricity_um=8, lobe_imbalance=0.3, pitch_radius_mm=20)
+    offset = np.array([0.0, -8e-6])  # of the fixed spline's centre, m
+    for motor in np.linspace(0, 7, 15):
+        turned = 0.0
+        for share, lobe in ((0.65, motor), (0.35, motor + math.pi)):
+            tangent = np.array([-math.sin(lobe), math.cos(lobe)])
+            turned += share * (offset @ tangent) / 20e-3
+        # the offset of -y turns lobe 1 by -d cos(motor): the effect's phase is a quarter turn on
+        assert Model(effect).error(motor + 1.5 * math.pi, 0.0)[0] == pytest.approx(turned, abs=1e-12)
+
+
+def test_output_eccentricity_is_one_period_per_output_turn() -> None:
+    model = Model(OutputEccentricity(eccentricity_um=5, radius_mm=25))
+    values = [model.error(17.0 * x, x)[0] for x in np.linspace(0, 2 * math.pi, 9)]
+    assert np.allclose(values, 2e-4 * np.sin(np.linspace(0, 2 * math.pi, 9)), atol=1e-15)
+
+
+def test_damaged_tooth_is_felt_by_both_lobes_with_a_gaussians_width() -> None:
+    width = math.radians(6)
+    model = Model(DamagedTooth(amplitude_arcmin=-0.3, width_deg=6, position_deg=30))
+    start = math.radians(30)
+    for turn in (0.0, math.pi, 2 * math.pi):
+        assert model.error(start + turn + 0.5, 0.5)[0] == pytest.approx(
+            -0.3 * ARCMIN
+        )  # rides with the output
+        assert model.error(start + turn + width, 0)[0] == pytest.approx(
+            -0.3 * ARCMIN * math.exp(-0.5), rel=0.01
+        )
+    assert abs(model.error(start + math.pi / 2, 0)[0]) < 1e-9 * ARCMIN
+
+
+def test_friction_of_the_catalogue_set_gives_the_measured_no_load_torques() -> None:
+    for effects, base in (
+        ((InputCoulombViscous(),), 0.0),
+        ((InputCoulombViscous(viscous_nm_s_per_rad=0),), 3.5e-4),
+    ):
+        model = Model(*effects, base=base)
+        for rpm, torque in ((2000, 0.105), (3500, 0.160)):
+            speed = rpm * 2 * math.pi / 60
+            assert -at(model, MOTOR_VELOCITY=speed)[k.MOTOR_TORQUE] == pytest.approx(torque, rel=0.01)
+
+
+def test_load_side_friction_opposes_the_output_only() -> None:
+    model = Model(LoadSideFriction(coulomb_nm=2, viscous_nm_s_per_rad=3))
+    outputs = at(model, OUTPUT_VELOCITY=-1.5, MOTOR_VELOCITY=40)
+    assert outputs[k.OUTPUT_TORQUE] == pytest.approx(2 + 4.5)
+    assert outputs[k.MOTOR_TORQUE] == 0
+    assert outputs[k.INPUT_FRICTION] == 0
+
+
+def test_stribeck_bump_peaks_near_static_friction_and_vanishes_at_speed() -> None:
+    effect = StribeckFriction(
+        extra_static_nm=0.01, stribeck_velocity_rad_per_s=5, smoothing_velocity_rad_per_s=0.01
+    )
+    model = Model(effect)
+    speeds = np.array([0.1, 5.0, 50.0])
+    torque = [-at(model, MOTOR_VELOCITY=w)[k.INPUT_FRICTION] for w in speeds]
+    assert np.allclose(torque, 0.01 * np.exp(-((speeds / 5) ** 2)), rtol=1e-6, atol=1e-20)
+
+
+@pytest.mark.parametrize("speed", [0.05, 2.0, -8.0, 60.0])
+def test_lugre_settles_on_the_stribeck_curve_at_any_steady_speed(speed: float) -> None:
+    effect = LugreFriction(viscous_nm_s_per_rad=1e-3)
+    model = Model(effect)
+    slide = 40 * effect.static_nm / effect.stiffness_nm_per_rad
+    times = np.linspace(0, slide / abs(speed), 50)
+    z = model.follow(k.MOTOR_ANGLE, lambda t: speed * t, lambda t: speed, times)[0, -1]
+    inputs = model.initial
+    inputs[k.MOTOR_VELOCITY], inputs[k.OWN] = speed, z
+    level = 0.032 + 0.008 * math.exp(-((speed / 5) ** 2))
+    expected = -(math.copysign(level, speed) + 1e-3 * speed)
+    assert model(inputs)[0][k.MOTOR_TORQUE] == pytest.approx(expected, rel=1e-6)
+
+
+def test_lugre_presliding_is_a_spring_of_the_bristles() -> None:
+    model = Model(LugreFriction(stiffness_nm_per_rad=20, damping_nm_s_per_rad=0))
+    small = 1e-6  # rad: far below the break-away displacement of 2e-3
+    z = model.follow(k.MOTOR_ANGLE, lambda t: small * t, lambda t: small, np.linspace(0, 1, 3))[0, -1]
+    assert z == pytest.approx(small, rel=1e-3)
+    inputs = model.initial
+    inputs[k.OWN] = z
+    assert model(inputs)[0][k.MOTOR_TORQUE] == pytest.approx(-20 * small, rel=1e-3)
+
+
+def test_lugre_with_constant_bristle_damping_would_create_energy_where_the_fading_one_does_not() -> None:
+    # The state that makes the heat smallest, s = 2, on a drive with strong damping: the bound is sharp there.
+    effect = LugreFriction(damping_nm_s_per_rad=1.0, static_nm=0.064, coulomb_nm=0.032)
+    model = Model(effect)
+    speeds = np.geomspace(1e-3, 1e3, 300)
+
+    def heat(speed: float) -> float:
+        level = 0.032 + 0.032 * math.exp(-((speed / 5) ** 2))
+        inputs = model.initial
+        inputs[k.MOTOR_VELOCITY], inputs[k.OWN] = speed, 2 * level / effect.stiffness_nm_per_rad
+        return float(model(inputs)[0][k.DISSIPATED])
+
+    assert min(heat(w) for w in speeds) >= 0
+    constant = [4 * w * (0.032 + 0.032 * math.exp(-((w / 5) ** 2))) - 1.0 * w**2 for w in speeds]
+    assert min(constant) < 0
+    with pytest.raises(ValidationError, match="creates energy"):
+        LugreFriction(damping_nm_s_per_rad=1.0, damping_velocity_rad_per_s=5.0)
+
+
+def cycle(
+    effect: TorsionalHysteresisMaxwell, amplitude: float, rate: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Twist and torque over two triangle cycles from rest, 400 samples a quarter, shape (n,) each."""
+    model = Model(effect)
+    corners = amplitude * np.array([0, 1, 0, -1, 0, 1, 0, -1, 0.0])
+    own, twist, torque = model.initial[k.OWN :], [0.0], [0.0]
+    for start, stop in pairwise(corners):
+        way = np.linspace(0, 1, 401)
+        speed = rate * (stop - start)
+
+        def slope(t: float, y: np.ndarray, speed: float = speed) -> np.ndarray:
+            inputs = model.initial
+            inputs[k.TWIST_RATE], inputs[k.OWN :] = speed, y
+            return model(inputs)[0][k.OWN :]
+
+        step = (
+            0.005 / rate
+        )  # a sharp element's slip lies between two steps of a solver that sees a straight line
+        solved = solve_ivp(
+            slope, (0, 1 / rate), own, "LSODA", way / rate, rtol=1e-9, atol=1e-9, max_step=step
+        )
+        own = solved.y[:, -1]
+        twist += list(start + (stop - start) * way[1:])
+        torque += list(solved.y.sum(axis=0)[1:])
+    return np.array(twist), np.array(torque)
+
+
+def test_maxwell_loop_has_the_area_of_ideal_elastoplastic_elements() -> None:
+    elements = [(8000.0, 0.8), (3000.0, 0.9)]
+    given = tuple(SlipElement(stiffness_nm_per_rad=a, slip_torque_nm=b) for a, b in elements)
+    amplitude = 1e-3
+    ideal = sum(4 * w * (amplitude - w / s) for s, w in elements)
+    for sharpness, tolerance in ((12.0, 0.01), (100.0, 0.001)):
+        x, f = cycle(TorsionalHysteresisMaxwell(elements=given, sharpness=sharpness), amplitude)
+        area = abs(np.trapezoid(f[1600:], x[1600:]))  # second cycle: x and F close
+        assert area == pytest.approx(ideal, rel=tolerance)
+
+
+def test_maxwell_is_rate_independent_and_never_exceeds_its_slip_torque() -> None:
+    effect = TorsionalHysteresisMaxwell()
+    slow, fast = cycle(effect, 2e-3, 1.0)[1], cycle(effect, 2e-3, 1000.0)[1]
+    assert np.allclose(slow, fast, atol=1e-5)
+    assert 0.99 * 2.0 < np.abs(slow).max() < 2.0 + 1e-8
+
+
+@pytest.mark.parametrize(("sharpness", "tolerance"), [(12, 0.02), (100, 0.003)])
+def test_maxwell_obeys_masing(sharpness: float, tolerance: float) -> None:
+    """After a reversal the branch is the virgin curve, doubled in both directions (Masing 1926)."""
+    effect = TorsionalHysteresisMaxwell(sharpness=sharpness)
+    x, f = cycle(effect, 1e-3)
+    virgin_x, virgin_f = x[:401], f[:401]
+    branch_x, branch_f = x[400:1201], f[400:1201]
+    expected = virgin_f[-1] - 2 * np.interp((branch_x[0] - branch_x) / 2, virgin_x, virgin_f)
+    assert np.abs(branch_f - expected).max() < tolerance * 2.0
+
+
+def test_maxwell_default_stays_within_the_catalogues_hysteresis_loss() -> None:
+    """Below 1 arcmin of width at zero torque over K1 = 1.6e4 N m/rad: 2 sum W < 4.65 N m."""
+    x, f = cycle(TorsionalHysteresisMaxwell(), 2.1e-3)
+    up = np.interp(0.0, x[2000:2801][::-1], f[2000:2801][::-1])
+    assert 2 * abs(up) < ARCMIN * 1.6e4
+
+
+def test_duhem_branch_is_the_exponential() -> None:
+    model = Model(TorsionalHysteresisDuhem(stiffness_nm_per_rad=4000, saturation_torque_nm=2))
+    times = np.linspace(0, 1, 20)
+    z = model.follow(k.TWIST, lambda t: 1e-3 * t, lambda t: 1e-3, times)[0]
+    assert np.allclose(z, 2 * (1 - np.exp(-2000 * 1e-3 * times)), atol=1e-7)
+    slower = model.follow(k.TWIST, lambda t: 1e-5 * t, lambda t: 1e-5, 100 * times)[0]
+    assert np.allclose(z, slower, atol=1e-6)
+
+
+def test_backlash_widens_by_half_on_each_side() -> None:
+    build = FakeBuilder()
+    OutputBacklash(backlash_arcmin=3).contribute(build)
+    assert build.half_gap == pytest.approx(1.5 * ARCMIN)
+
+
+def test_cogging_does_no_work_over_a_period_and_the_windings_share_follows_the_load() -> None:
+    cogging = Model(MotorTorqueRipple(components=(RippleComponent(order=24, cogging_nm=0.01, phase_deg=17),)))
+    work, _ = quad(lambda a: at(cogging, MOTOR_ANGLE=a)[k.MOTOR_TORQUE], 0, 2 * math.pi / 24)
+    assert work == pytest.approx(0, abs=1e-10)
+    share = Model(MotorTorqueRipple(components=(RippleComponent(order=6, share=0.02),)))
+    angle = math.pi / 12
+    assert at(share, MOTOR_ANGLE=angle, TRANSMITTED_TORQUE=50)[k.MOTOR_TORQUE] == pytest.approx(
+        0.02 * 50 / RATIO
+    )
+
+
+def soak(
+    effect: ThermalFriction, speed: float, base: float, duration: float
+) -> tuple[np.ndarray, np.ndarray, Model]:
+    model = Model(effect, base=base)
+    times = np.linspace(0, duration, 40)
+    return times, model.follow(k.MOTOR_ANGLE, lambda t: 0.0, lambda t: speed, times)[0], model
+
+
+def test_temperature_follows_the_exponential_of_a_constant_heat() -> None:
+    effect = ThermalFriction(
+        viscosity_coefficient_per_k=0, heat_capacity_j_per_k=400, thermal_resistance_k_per_w=2
+    )
+    times, temperature, _ = soak(effect, 200.0, 3e-4, 3000.0)
+    rise = 2 * 3e-4 * 200.0**2
+    assert np.allclose(temperature, 20 + rise * (1 - np.exp(-times / 800)), rtol=1e-6)
+
+
+def test_warm_drive_settles_where_its_falling_friction_balances_the_cooling() -> None:
+    effect = ThermalFriction()
+    _, temperature, model = soak(effect, 300.0, 3.5e-4, 20000.0)
+    warm = temperature[-1] - 20
+    heat = 3.5e-4 * math.exp(-0.033 * warm) * 300.0**2
+    assert warm == pytest.approx(1.5 * heat, rel=1e-6)
+    inputs = model.initial
+    inputs[k.MOTOR_VELOCITY], inputs[k.OWN] = 300.0, temperature[-1]
+    assert model(inputs)[0][k.DISSIPATED] == pytest.approx(heat)
+
+
+@pytest.mark.parametrize(("degc", "rpm", "nu"), [(40, 2000, 0.497), (-10, 2000, 2.858), (40, 3500, 0.497)])
+def test_default_temperature_dependence_reproduces_palmgrens(degc: float, rpm: float, nu: float) -> None:
+    """Palmgren's lubricant torque grows with (viscosity * speed)^(2/3); nu: relative to 20 C."""
+    speed = rpm * 2 * math.pi / 60
+    at_20 = 0.032 + 3.5e-4 * speed
+    palmgren = at_20 * nu ** (2 / 3)
+    model = Model(InputCoulombViscous(viscous_nm_s_per_rad=0), ThermalFriction(), base=3.5e-4)
+    inputs = model.initial
+    inputs[k.MOTOR_VELOCITY], inputs[k.OWN] = speed, degc
+    assert -model(inputs)[0][k.MOTOR_TORQUE] == pytest.approx(palmgren, rel=0.12)
+
+
+def test_unbalance_is_a_pendulums_weight() -> None:
+    model = Model(Unbalance(output_kg_m=0.2))
+    assert at(model, OUTPUT_ANGLE=0.0)[k.OUTPUT_TORQUE] == pytest.approx(-0.2 * 9.80665)
+    rise = at(model, OUTPUT_ANGLE=math.pi / 2)[k.STORED] - at(model, OUTPUT_ANGLE=-math.pi / 2)[k.STORED]
+    assert rise == pytest.approx(2 * 0.2 * 9.80665)
+
+
+def test_load_dependent_loss_is_a_share_of_the_load_in_both_directions_of_power() -> None:
+    model = Model(LoadDependentLoss(coefficient=0.05))
+    for load in (52.0, -52.0):
+        for speed in (100.0, -100.0):
+            torque = at(model, TRANSMITTED_TORQUE=load, MOTOR_VELOCITY=speed)[k.MOTOR_TORQUE]
+            assert torque == pytest.approx(-math.copysign(0.05 * 52 / 100, speed), rel=0.02)
+
+
+def test_cubic_spring_is_the_derivative_of_its_energy() -> None:
+    model = Model(StiffnessNonlinearity(cubic_nm_per_rad3=1e9))
+    assert at(model, TWIST=2e-3)[k.TWIST_TORQUE] == pytest.approx(-8.0)
+    work, _ = quad(lambda x: -at(model, TWIST=x)[k.TWIST_TORQUE], 0, 2e-3)
+    assert at(model, TWIST=2e-3)[k.STORED] == pytest.approx(work)
+
+
+def wind_up(effect: FlexsplineStiffening | WaveGeneratorCompliance | BaseFlexibility, torque: float) -> float:
+    build = FakeBuilder()
+    effect.contribute(build)
+    return float(build.compliances[0](np.array([torque]))[0])
+
+
+def test_flexspline_wind_up_integrates_its_stiffness() -> None:
+    effect = FlexsplineStiffening(stiffness_nm_per_rad=2e4, coefficient_per_nm=0.03)
+    expected, _ = quad(lambda x: 1 / (2e4 * (1 + (0.03 * x) ** 2)), 0, 52)
+    assert wind_up(effect, 52.0) == pytest.approx(expected)
+
+
+def test_wave_generator_wind_up_integrates_its_stiffness_at_the_input() -> None:
+    effect = WaveGeneratorCompliance(stiffness_nm_per_rad=6, coefficient_per_nm=1.5)
+    at_input, _ = quad(lambda x: 1 / (6 * math.exp(1.5 * x)), 0, 52 / 100)
+    assert wind_up(effect, 52.0) == pytest.approx(at_input / 100)
+    assert wind_up(effect, 1e-3) == pytest.approx(1e-3 / (6 * 100**2), rel=1e-4)
+    assert wind_up(effect, -52.0) == pytest.approx(-wind_up(effect, 52.0))
+
+
+@pytest.mark.parametrize(("flexspline", "circular"), [(200, 202), (160, 162)])
+def test_base_flexibility_equals_the_tooth_counts_lever(flexspline: int, circular: int) -> None:
+    """Circular spline fixed: turning it by one turn turns the flexspline by z_c/z_f with the motor locked."""
+    build = FakeBuilder(ratio=-flexspline / (circular - flexspline))
+    BaseFlexibility(stiffness_nm_per_rad=1e5).contribute(build)
+    expected = (circular / flexspline) ** 2 * 40 / 1e5
+    assert build.compliances[0](np.array([40.0]))[0] == pytest.approx(expected)
