@@ -49,7 +49,7 @@ def test_recovering_a_sound_log_loses_nothing(log, recording, tmp_path):
 def test_a_flipped_byte_anywhere_is_noticed(log):
     size = log.stat().st_size
     rng = np.random.default_rng(5)
-    places = [*rng.integers(8, size - 8, 60).tolist(), *range(size - 60, size)]
+    places = [*rng.integers(8, size - 8, 30).tolist(), *range(size - 40, size, 2)]
     for at in places:
         flip(log, at)
         with pytest.raises(InputError, match=r"hdsim recover|not an MCAP"):
@@ -149,9 +149,13 @@ def test_a_killed_run_is_recovered(tmp_path):
     with pytest.raises(InputError, match=r"no such file; .*hdsim recover .*run\.mcap\.partial"):
         open_log(path)
     whole = 0
-    with pytest.raises(TruncatedError):
+    try:
         for span in walk(map_file(partial)):
             whole += span.opcode == CHUNK
+    except TruncatedError:
+        pass
+    else:
+        pytest.fail("the killed run left a whole file")
     report = recover_log(partial, path)
     assert report.chunks == whole >= 3
     assert verify_log(path).ok
