@@ -74,6 +74,8 @@ class Builder(Protocol):
     ratio: float
     """Signed ratio motor angle / output angle."""
     rated_torque_nm: float
+    viscous_friction_nm_s_per_rad: float
+    """The drive's own viscous friction at the motor shaft."""
     seed: int
     """Seed of every random number of the run; derive one with ``numpy.random.default_rng([seed, ...])``."""
 
