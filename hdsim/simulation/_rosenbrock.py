@@ -283,7 +283,8 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
             total, bend = 0.0, 0.0
             for i in range(n):
                 new[i] += u6[i]
-                tolerance = 1.0 / (atol[i] + rtol * max(abs(y[i]), abs(new[i])))
+                # The floor is for a state that is exactly 0 and has no absolute tolerance.
+                tolerance = 1.0 / max(atol[i] + rtol * max(abs(y[i]), abs(new[i])), 1e-150)
                 ratio = u6[i] * tolerance
                 total += ratio * ratio
                 cubic = c.H31 * u1[i] + c.H32 * u2[i] + c.H33 * u3[i] + c.H34 * u4[i] + c.H35 * u5[i]

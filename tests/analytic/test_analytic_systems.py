@@ -158,11 +158,12 @@ def _fixed_step_error(case, steps, at_ends):
 
 
 @pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
-def test_rodas4_has_order_four_and_its_interpolant_at_least_three(case):
+def test_rodas4_has_order_four_at_the_steps_and_between_them(case):
     coarse, fine = 400, 1600
     order = {}
     for at_ends in (True, False):
         ratio = _fixed_step_error(case, coarse, at_ends) / _fixed_step_error(case, fine, at_ends)
         order[at_ends] = np.log(ratio) / np.log(fine / coarse)
     assert order[True] == pytest.approx(4.0, abs=0.2)
-    assert order[False] > 3.0
+    # An extension of order 3: its error is one of order 4 in each step, and does not add up.
+    assert order[False] == pytest.approx(4.0, abs=0.2)
