@@ -343,7 +343,7 @@ class Recorded(Shape):
     """A signal read from a CSV file with a header line; first and last value are held outside its times."""
 
     file: Path
-    """CSV file; a relative name is taken from the folder of the scenario."""
+    """CSV file; in a scenario, a relative name counts from the folder of the scenario that names it."""
     time_column: str = "time"
     """Header of the column of times, in s, strictly increasing."""
     value_column: str = "value"

@@ -104,7 +104,8 @@ def profile(phases: Sequence[tuple[float, float, float]], final: float, velocity
         value += duration * (velocity + duration * (acceleration / 2.0 + duration * jerk / 6.0))
         velocity += duration * (acceleration + duration * jerk / 2.0)
         time += duration
-    return Move((Segment(law.CUBIC, starts, rows), hold(time, final)), time, 0.0, final)
+    moving = (Segment(law.CUBIC, starts, rows),) if starts else ()
+    return Move((*moving, hold(time, final)), time, 0.0, final)
 
 
 def joined(moves: Sequence[Move], initial: float = 0.0) -> Move:

@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, cast, get_args, get_origin
 
-from pydantic import Field, ValidationError, ValidationInfo, create_model, field_validator, model_validator
+from pydantic import Field, ValidationError, create_model, model_validator
 from pydantic.fields import FieldInfo
 
 from hdsim.actuation import shapes
@@ -164,13 +163,7 @@ class SignalModel(Parameters):
 
 
 class _RecordedModel(SignalModel):
-    """A recorded signal: its file is looked for and read when the scenario is checked."""
-
-    @field_validator("file", check_fields=False)
-    @classmethod
-    def _found(cls, file: Path, info: ValidationInfo) -> Path:
-        folder = (info.context or {}).get("directory")
-        return (Path(folder) / file if folder is not None else file).absolute()
+    """A recorded signal: its file is read when the scenario is checked, so that mistakes show there."""
 
     @model_validator(mode="after")
     def _readable(self) -> _RecordedModel:

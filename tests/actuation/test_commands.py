@@ -412,3 +412,32 @@ print([name for name in ("numpy", "scipy", "numba", "control", "matplotlib") if 
 """
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+AS_STATE_SPACE = {
+    "type": "state_space",
+    "inputs": ["reference_position", "motor_angle", "reference_velocity", "motor_velocity"],
+    "A": [[0.0]],
+    "B": [[20.0, -20.0, 0.0, 0.0]],
+    "C": [1.0],
+    "D": [1.0, -1.0, 0.03, -0.03],
+}
+
+
+def test_a_pid_written_as_state_space_with_its_anti_windup_is_the_pid():
+    law = {**PID, "integral_nm_per_rad_s": 20.0, "anti_windup_time_s": 0.05}
+    more = {"trajectory": {"type": "step", "height_rad": 10.0}, "torque_limit_nm": 0.2}
+    built_in = tracked(position(law, **more), TIMES)
+    written = tracked(position({**AS_STATE_SPACE, "anti_windup_gain": [20.0]}, **more), TIMES)
+    np.testing.assert_allclose(written.angle, built_in.angle, rtol=1e-7, atol=1e-7)
+
+
+def test_a_sampled_state_space_controller_follows_its_anti_windup_gain():
+    more = {
+        "trajectory": {"type": "step", "height_rad": 10.0},
+        "torque_limit_nm": 0.2,
+        "sample_period_s": 1e-3,
+    }
+    held, _ = run_sampled(position({**AS_STATE_SPACE, "anti_windup_gain": [20.0]}, **more), 1000)
+    wound, _ = run_sampled(position(AS_STATE_SPACE, **more), 1000)
+    assert np.max(held) - 10.0 < 0.5 * (np.max(wound) - 10.0)

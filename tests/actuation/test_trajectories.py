@@ -205,6 +205,15 @@ def test_units_mean_the_same_move():
         np.testing.assert_allclose(move.values(t), moves[0].values(t), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("kind", ["trapezoid", "s_curve"])
+def test_a_move_of_no_distance_is_over_at_once(kind):
+    limits = {"maximum_velocity_rpm": 1.0, "maximum_acceleration_rad_per_s2": 1.0}
+    limits |= {"maximum_jerk_rad_per_s3": 1.0} if kind == "s_curve" else {}
+    signal = angle(type=kind, distance_rad=0.0, start_time_s=0.5, **limits)
+    assert signal.end_time == 0.5
+    assert not signal.values([0.0, 0.5, 1.0]).any()
+
+
 def test_a_ramp_of_velocity_is_an_acceleration():
     signal = VELOCITY.validate_python({"type": "ramp", "acceleration_rad_per_s2": 2.0, "duration_s": 3.0})
     assert signal.values([3.5])[0, 0] == pytest.approx(6.0)
@@ -319,19 +328,14 @@ def test_a_recorded_signal_is_scipys_interpolation(tmp_path, interpolation):
 
     rng = np.random.default_rng(1)
     t, v = np.cumsum(rng.uniform(0.1, 0.5, 12)), rng.normal(size=12)
-    write(
-        tmp_path,
-        "t,force,T\n" + "".join(f"{a!r},x,{b!r}\n" for a, b in zip(t.tolist(), v.tolist(), strict=False)),
-    )
-    signal = TORQUE.validate_python(
-        {
-            "type": "recorded",
-            "file": "load.csv",
-            "time_column": "t",
-            "value_column": "T",
-            "interpolation": interpolation,
-        },
-        context={"directory": str(tmp_path)},
+    rows = [f"{a!r},x,{b!r}\n" for a, b in zip(t.tolist(), v.tolist(), strict=True)]
+    write(tmp_path, "t,force,T\n" + "".join(rows))
+    signal = torque(
+        type="recorded",
+        file=str(tmp_path / "load.csv"),
+        time_column="t",
+        value_column="T",
+        interpolation=interpolation,
     )
     fine = np.linspace(t[0], t[-1] - 1e-9, 500)
     reference = {
