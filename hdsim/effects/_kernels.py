@@ -30,7 +30,7 @@ def coulomb_viscous(
     outputs[DISSIPATED] += torque * speed
     jacobian[DISSIPATED * columns + column] += torque + slope * speed
     if row == MOTOR_TORQUE:
-        outputs[INPUT_FRICTION] -= torque
+        outputs[INPUT_FRICTION] += torque
 
 
 @twist

@@ -27,7 +27,7 @@ def mesh_loss(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any
     outputs[DISSIPATED] += level * sign * speed
     jacobian[DISSIPATED * columns + MOTOR_VELOCITY] += slope * speed + level * sign
     jacobian[DISSIPATED * columns + TRANSMITTED_TORQUE] += level_load * sign * speed
-    outputs[INPUT_FRICTION] -= level * sign
+    outputs[INPUT_FRICTION] += level * sign
 
 
 class LoadDependentLoss(Effect):

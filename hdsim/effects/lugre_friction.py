@@ -45,7 +45,7 @@ def bristles(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any,
     jacobian[DISSIPATED * columns + MOTOR_VELOCITY] += torque_w * speed + torque - s0 * z * rate_w
     jacobian[DISSIPATED * columns + own] += torque_z * speed - s0 * (rate + z * rate_z)
     outputs[STORED] += 0.5 * s0 * z * z
-    outputs[INPUT_FRICTION] -= torque
+    outputs[INPUT_FRICTION] += torque
 
 
 class LugreFriction(Effect):

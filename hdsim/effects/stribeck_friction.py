@@ -24,7 +24,7 @@ def stribeck(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any,
     jacobian[MOTOR_TORQUE * columns + MOTOR_VELOCITY] -= slope
     outputs[DISSIPATED] += torque * speed
     jacobian[DISSIPATED * columns + MOTOR_VELOCITY] += torque + slope * speed
-    outputs[INPUT_FRICTION] -= torque
+    outputs[INPUT_FRICTION] += torque
 
 
 class StribeckFriction(Effect):

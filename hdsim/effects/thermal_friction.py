@@ -28,7 +28,7 @@ def warming(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, 
     outputs[MOTOR_TORQUE] -= torque
     jacobian[MOTOR_TORQUE * columns + MOTOR_VELOCITY] -= torque_w
     jacobian[MOTOR_TORQUE * columns + own] -= torque_t
-    outputs[INPUT_FRICTION] -= torque
+    outputs[INPUT_FRICTION] += torque
     outputs[DISSIPATED] += torque * speed
     jacobian[DISSIPATED * columns + MOTOR_VELOCITY] += torque_w * speed + torque
     jacobian[DISSIPATED * columns + own] += torque_t * speed

@@ -118,7 +118,7 @@ def test_stribeck_bump_peaks_near_static_friction_and_vanishes_at_speed() -> Non
     )
     model = Model(effect)
     speeds = np.array([0.1, 5.0, 50.0])
-    torque = [-at(model, MOTOR_VELOCITY=w)[k.INPUT_FRICTION] for w in speeds]
+    torque = [at(model, MOTOR_VELOCITY=w)[k.INPUT_FRICTION] for w in speeds]
     assert np.allclose(torque, 0.01 * np.exp(-((speeds / 5) ** 2)), rtol=1e-6, atol=1e-20)
 
 
