@@ -331,7 +331,9 @@ def test_a_sampled_integrator_stops_at_the_limit():
 def test_a_sample_at_a_step_sees_the_step_whatever_the_rounding():
     law = {"type": "state_space", "inputs": ["reference_position"], "D": [1.0]}
     for n in range(1, 200):
-        command = position(law, {**STEP, "start_time_s": n / 1000}, sample_period_s=1e-3)
+        # The step may be written a rounding later than the sample is computed (as 0.1 + 0.2 and 0.3 are).
+        later = float(np.nextafter(n * 1e-3, 1.0))
+        command = position(law, {**STEP, "start_time_s": later}, sample_period_s=1e-3)
         sampled = command.sampled(1.0)
         rest = dict.fromkeys(INPUTS[3:], 0.0)
         assert sampled.update((n - 1) * 1e-3, rest) == 0.0

@@ -145,7 +145,8 @@ def test_a_trapezoid_covers_its_distance_in_the_shortest_time_within_its_limits(
     assert np.all(np.diff(np.abs(value)) >= -1e-9 * d)
     # The parts before and after the end of the move meet there.
     end = signal.end_time
-    left = signal.data.values([end], [end * (1.0 - 1e-9)])[:2, 0]
+    rise = min(v, math.sqrt(d * a)) / a
+    left = signal.data.values([end], [end - 0.5 * rise])[:2, 0]
     assert abs(left[0] - signal.si.distance) < 1e-9 * d
     # The time itself is rounded, to 2e-16 of the end.
     assert abs(left[1]) < 1e-8 * v + 1e-15 * end * a
