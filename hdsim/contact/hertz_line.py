@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hdsim.contact.law import Array, ContactLaw, ValidityWarning
+from hdsim.contact.law import Array, ContactLaw
 from hdsim.errors import InputError
 
 
@@ -54,28 +52,28 @@ class HertzLine(ContactLaw):
         return 2.0 * math.sqrt(force_n * self.radius_m / self._rigidity)
 
     def _inside(self, force: Array) -> Array:
-        return np.asarray(force / self._rigidity * (1.0 + np.log(self._scale / force)))
+        return np.asarray(force / self._rigidity * (1.0 + math.log(self._scale) - np.log(force)))
 
-    def _warn(self, beyond: NDArray[np.bool_]) -> None:
-        if beyond.any():
-            warnings.warn(
-                f"line contact: above {self.limit_force_n:.4g} N the strip is wider than half its length; "
-                "the law is continued along its tangent",
-                ValidityWarning,
-                stacklevel=4,
-            )
+    @property
+    def valid_up_to_n(self) -> float:
+        """Force at which the strip is half as wide as it is long, N."""
+        return self.limit_force_n
+
+    @property
+    def validity(self) -> str:
+        """What fails above that force."""
+        return (
+            f"above {self.limit_force_n:.4g} N the strip of contact is wider than half its length; "
+            "the law is continued along its tangent"
+        )
 
     def _penetration(self, force: Array) -> Array:
-        beyond = force > self.limit_force_n
-        self._warn(beyond)
         inside = self._inside(np.minimum(force, self.limit_force_n))
         return np.asarray(inside + np.maximum(force - self.limit_force_n, 0.0) / self._limit_stiffness)
 
     def _force(self, penetration: Array) -> Array:
         from scipy.special import lambertw
 
-        beyond = penetration > self._limit
-        self._warn(beyond)
         # t (1 - ln t) = y with t = F / scale: with w = 1 - ln t it reads w exp(-w) = y / e.
         y = np.minimum(penetration, self._limit) * self._rigidity / self._scale
         w = -lambertw(-y / math.e, -1).real

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
@@ -29,27 +31,46 @@ class ContactLaw(ABC):
 
     def force(self, penetration_m: ArrayLike) -> Array:
         """Normal force F(f), N."""
-        return _where_positive(self._force, penetration_m)
+        return self._told(_where_positive(self._force, penetration_m))
 
     def penetration(self, force_n: ArrayLike) -> Array:
         """Penetration f(F), m, the inverse of ``force``."""
+        self._told(np.asarray(force_n, dtype=float))
         return _where_positive(self._penetration, force_n)
 
     def stiffness_at_force(self, force_n: ArrayLike) -> Array:
         """Tangent stiffness dF/df at a force, N/m."""
+        self._told(np.asarray(force_n, dtype=float))
         return _where_positive(self._stiffness, force_n)
 
     def stiffness(self, penetration_m: ArrayLike) -> Array:
         """Tangent stiffness dF/df at a penetration, N/m."""
-        return _where_positive(lambda f: self._stiffness(self._force(f)), penetration_m)
+        return _where_positive(self._stiffness, self.force(penetration_m))
 
     def energy(self, penetration_m: ArrayLike) -> Array:
         """Stored energy U(f), the integral of F from 0 to f, J."""
-        return _where_positive(lambda f: self._energy(self._force(f)), penetration_m)
+        return _where_positive(self._energy, self.force(penetration_m))
 
     def energy_at_force(self, force_n: ArrayLike) -> Array:
         """Stored energy at a force, J."""
+        self._told(np.asarray(force_n, dtype=float))
         return _where_positive(self._energy, force_n)
+
+    @property
+    def valid_up_to_n(self) -> float:
+        """Force up to which the law's assumptions hold, N; larger ones are answered with a warning."""
+        return math.inf
+
+    @property
+    def validity(self) -> str:
+        """What fails above that force, for the warning."""
+        return ""
+
+    def _told(self, force: Array) -> Array:
+        """Warn when a force is beyond the law's validity; hand it on."""
+        if force.size and np.max(force) > self.valid_up_to_n:
+            warnings.warn(f"{np.max(force):.4g} N: {self.validity}", ValidityWarning, stacklevel=3)
+        return force
 
     @property
     def initial_stiffness_n_per_m(self) -> float:

@@ -13,8 +13,8 @@ from hdsim.contact.asperities import Asperities, AsperityStiffness
 from hdsim.contact.law import Array, ContactLaw, ValidityWarning
 from hdsim.errors import InputError
 
-#: One per cent of the mean tooth load of the source's drive at its rated torque (34.67 N).
-FLOOR_FORCE_N = 0.35
+#: A tenth of the mean tooth load of the source's drive at its rated torque (34.67 N).
+FLOOR_FORCE_N = 3.5
 #: Face width 10 mm times a tooth height of 0.5 mm: the whole flank.
 NOMINAL_AREA_M2 = 5.0e-6
 #: Force up to which the law is integrated; it goes on along its tangent beyond.
@@ -34,8 +34,8 @@ class MajumdarBhushan(ContactLaw):
         K(F) = max(K_MB(F), K_MB(F_floor)),
 
     hence F is linear in f up to F_floor and continuously differentiable for f > 0. F_floor is
-    ``floor_force_n`` (default: 0.35 N), but at least the force at which the largest contact is twice the
-    critical area, where K_MB is safely above zero; a warning tells when this raises a floor that was given.
+    ``floor_force_n``, but at least the force at which the largest contact is twice the
+    critical area, where K_MB is safely above zero; a warning tells when this raises the floor.
 
     A second warning tells when a force asks for more truncated area than the nominal area has.
 
@@ -46,7 +46,7 @@ class MajumdarBhushan(ContactLaw):
         hardness_pa: hardness of the softer flank, Pa.
         poisson_ratio: Poisson's ratio of the softer flank.
         asperity_stiffness: ``printed`` (Eq. 11) or ``fixed-asperity`` (Hertz's factor 3/2).
-        floor_force_n: force below which the stiffness is constant, N; None for the default.
+        floor_force_n: force below which the stiffness is constant, N.
         nominal_area_m2: area on which the flanks can touch, m^2.
         gamma: density of asperities.
     """
@@ -60,14 +60,13 @@ class MajumdarBhushan(ContactLaw):
         poisson_ratio: float,
         asperity_stiffness: AsperityStiffness = "printed",
         *,
-        floor_force_n: float | None = None,
+        floor_force_n: float = FLOOR_FORCE_N,
         nominal_area_m2: float = NOMINAL_AREA_M2,
         gamma: float = 1.5,
     ) -> None:
-        floor = FLOOR_FORCE_N if floor_force_n is None else floor_force_n
-        if not floor > 0.0 or not nominal_area_m2 > 0.0:
+        if not floor_force_n > 0.0 or not nominal_area_m2 > 0.0:
             raise InputError(
-                f"floor force and nominal area must be positive, found {floor} N and {nominal_area_m2} m^2"
+                f"floor force and nominal area must be positive, found {floor_force_n} and {nominal_area_m2}"
             )
         self.equations = Asperities(
             D, G_m, reduced_modulus_pa, hardness_pa, poisson_ratio, gamma, asperity_stiffness
@@ -75,18 +74,17 @@ class MajumdarBhushan(ContactLaw):
         self.nominal_area_m2 = nominal_area_m2
         self.all_plastic_force_n = float(self.equations.load(self.critical_area))
         lowest = float(self.equations.load(2.0 * self.critical_area))
-        if floor_force_n is not None and lowest > floor_force_n:
+        if lowest > floor_force_n:
             warnings.warn(
                 f"below {self.all_plastic_force_n:.3g} N every asperity is plastic and Eq. 13 gives no "
                 f"stiffness; the constant stiffness reaches up to {lowest:.3g} N, not {floor_force_n:.3g} N",
                 ValidityWarning,
                 stacklevel=2,
             )
-        self.floor_force_n = max(floor, lowest)
+        self.floor_force_n = max(floor_force_n, lowest)
         self._integrate()
         largest = nominal_area_m2 / float(self.equations.truncated_area(1.0))
         self.area_bound_force_n = float(self.equations.load(largest))
-        self._told = False
 
     @property
     def critical_area(self) -> float:
@@ -153,15 +151,18 @@ class MajumdarBhushan(ContactLaw):
         slope = self.equations.load_slope(a) / self.equations.stiffness(a)
         return half * (slope @ _WEIGHTS), half * ((slope * self.equations.load(a)) @ _WEIGHTS)
 
-    def _tell(self, force: Array) -> None:
-        if not self._told and force.max() > self.area_bound_force_n:
-            self._told = True
-            warnings.warn(
-                f"{force.max():.4g} N: the truncated area exceeds the nominal {self.nominal_area_m2:.3g} m^2 "
-                f"from {self.area_bound_force_n:.4g} N on; the asperities no longer fit on the flank",
-                ValidityWarning,
-                stacklevel=5,
-            )
+    @property
+    def valid_up_to_n(self) -> float:
+        """Force from which on the truncated area exceeds the nominal area, N."""
+        return self.area_bound_force_n
+
+    @property
+    def validity(self) -> str:
+        """What fails above that force."""
+        return (
+            f"the truncated area exceeds the nominal {self.nominal_area_m2:.3g} m^2 from "
+            f"{self.area_bound_force_n:.4g} N on; the asperities no longer fit on the flank"
+        )
 
     def _area(self, force: Array) -> tuple[NDArray[np.intp], Array]:
         """Cell and ln(a_l) of forces between floor and top."""
@@ -171,7 +172,6 @@ class MajumdarBhushan(ContactLaw):
         return cell, self._root(find_root, force, self._nodes[cell] - 1e-12, self._nodes[cell + 1] + 1e-12)
 
     def _penetration(self, force: Array) -> Array:
-        self._tell(force)
         floor, top = self.floor_force_n, self._node_force[-1]
         cell, u = self._area(np.clip(force, floor, top))
         inside = self._node_penetration[cell] + self._quadrature(self._nodes[cell], u)[0]
@@ -193,11 +193,9 @@ class MajumdarBhushan(ContactLaw):
         u = find_root(excess, (low - 1e-12, high + 1e-12), args=args).x
         force = self.equations.load(np.exp(u)) + np.maximum(penetration - f1, 0.0) * self._top_stiffness
         force = np.where(penetration <= f0, penetration * self._floor_stiffness, force)
-        self._tell(force)
         return force
 
     def _stiffness(self, force: Array) -> Array:
-        self._tell(force)
         a = np.exp(self._area(np.clip(force, self.floor_force_n, self._node_force[-1]))[1])
         return np.maximum(self.equations.stiffness(a), self._floor_stiffness)
 

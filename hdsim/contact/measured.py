@@ -49,7 +49,9 @@ class TableLaw(ContactLaw):
         path = Path(path)
         try:
             with path.open(newline="", encoding="utf-8-sig") as file:
-                reader = csv.DictReader(line for line in file if not line.startswith("#"))
+                lines = list(file)
+                kept = [number for number, line in enumerate(lines, 1) if not line.startswith("#")]
+                reader = csv.DictReader(lines[number - 1] for number in kept)
                 names = [name.strip() for name in reader.fieldnames or []]
                 missing = [name for name in COLUMNS if name not in names]
                 if missing:
@@ -57,7 +59,7 @@ class TableLaw(ContactLaw):
                         f"{path}: found columns {', '.join(names) or 'none'}, expected {', '.join(COLUMNS)}"
                     )
                 reader.fieldnames = names
-                rows = [(reader.line_num, row) for row in reader]
+                rows = [(kept[reader.line_num - 1], row) for row in reader]
         except OSError as error:
             raise InputError(f"{path}: cannot read the contact table: {error.strerror}") from error
         except (UnicodeDecodeError, csv.Error) as error:

@@ -28,18 +28,27 @@ class SeriesLaw(ContactLaw):
         contact = self.law.initial_stiffness_n_per_m
         return contact * self.bending_stiffness_n_per_m / (contact + self.bending_stiffness_n_per_m)
 
+    @property
+    def valid_up_to_n(self) -> float:
+        """Force up to which the contact's assumptions hold, N."""
+        return self.law.valid_up_to_n
+
+    @property
+    def validity(self) -> str:
+        """What fails above that force."""
+        return self.law.validity
+
     def _penetration(self, force: Array) -> Array:
         return np.asarray(self.law._penetration(force) + force / self.bending_stiffness_n_per_m)
 
     def _force(self, penetration: Array) -> Array:
-        # The contact's penetration is the unknown: its share of the total lies between 0 and the total.
         from scipy.optimize.elementwise import find_root
 
         k = self.bending_stiffness_n_per_m
-        upper = np.minimum(self.law._force(penetration), k * penetration)
+        upper = k * penetration
 
         def excess(force: Array, target: Array) -> Array:
-            return self.law.penetration(force) + force / k - target
+            return self._penetration(np.maximum(force, np.finfo(float).tiny)) - target
 
         # A hair wider than the exact bracket, which rounding may close on the root.
         return np.asarray(
