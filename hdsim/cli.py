@@ -12,9 +12,14 @@ from hdsim.errors import HdsimError
 
 #: Where each command lives, and its line in ``hdsim --help``.
 COMMANDS: dict[str, tuple[str, str]] = {
+    "run": ("hdsim.simulation.commands:run", "Simulate a scenario, write its log, draw its figure."),
     "check": ("hdsim.scenario.commands:check", "Check scenarios and say what they describe."),
     "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios, for editors."),
     "effects": ("hdsim.scenario.commands:effects", "List the physical effects that a scenario can turn on."),
+    "info": ("hdsim.log.commands:info", "Show what is in a log."),
+    "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),
+    "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
+    "recover": ("hdsim.log.commands:recover", "Save what a damaged or unfinished log holds."),
 }
 
 
@@ -65,7 +70,9 @@ def _print_version(context: click.Context, _: click.Parameter, wanted: bool) -> 
 
 
 @click.group(
-    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+    cls=LazyGroup,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.option("--debug", is_flag=True, help="Show the Python traceback of an error.")
 @click.option(
@@ -76,8 +83,11 @@ def _print_version(context: click.Context, _: click.Parameter, wanted: bool) -> 
     callback=_print_version,
     help="Show the version.",
 )
-def hdsim(debug: bool) -> None:
+@click.pass_context
+def hdsim(context: click.Context, debug: bool) -> None:
     """Simulate harmonic drives, from the rough tooth flank to the log."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -97,7 +107,9 @@ def main(arguments: list[str] | None = None) -> None:
     except click.ClickException as error:
         if debug:
             raise
-        error.show()
+        context = getattr(error, "ctx", None)
+        hint = f" (see '{context.command_path} --help')" if context is not None else ""
+        click.echo(f"error: {' '.join(error.format_message().split())}{hint}", err=True)
         sys.exit(2)
     except HdsimError as error:
         if debug:

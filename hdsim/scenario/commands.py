@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from hdsim.scenario.problems import ScenarioError
+from hdsim.scenario.problems import Problem, ScenarioError
 
 
 @click.command(short_help="Check scenarios and say what they describe.")
@@ -15,7 +15,7 @@ def check(files: tuple[str, ...]) -> None:
     """Check scenarios: one line for every mistake, or OK and what each describes."""
     from hdsim.scenario.model import Scenario
 
-    problems = []
+    problems: list[Problem] = []
     for file in files:
         try:
             scenario = Scenario.from_yaml(file)
@@ -42,7 +42,7 @@ def schema(output: Path | None) -> None:
     from hdsim.scenario.model import Scenario
     from hdsim.scenario.schema import json_schema
 
-    text = json.dumps(json_schema(Scenario), indent=2)
+    text = json.dumps(json_schema(Scenario), indent=1)
     if output is None:
         click.echo(text)
         return

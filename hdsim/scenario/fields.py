@@ -209,11 +209,11 @@ def _noun(annotation: Any) -> str:
 def _bounds(metadata: Sequence[Any]) -> str:
     """Bounds in words, from objects that carry ``gt``, ``ge``, ``lt``, ``le``, lengths or a step."""
     names = {
-        "gt": "greater than {}",
-        "ge": "at least {}",
-        "lt": "less than {}",
-        "le": "at most {}",
-        "multiple_of": "in steps of {}",
+        "gt": "greater than {:.12g}",
+        "ge": "at least {:.12g}",
+        "lt": "less than {:.12g}",
+        "le": "at most {:.12g}",
+        "multiple_of": "in steps of {:.12g}",
         "min_length": "of length at least {}",
         "max_length": "of length at most {}",
         "pattern": "that matches {!r}",

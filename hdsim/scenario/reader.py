@@ -15,12 +15,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hdsim.scenario.problems import Mark, Problem, ScenarioError, describe, dotted, shorten
-
-if TYPE_CHECKING:
-    from ruamel.yaml.error import YAMLError
 
 #: Largest file that is read, in bytes; longer tables belong into a CSV file.
 MAX_BYTES = 1_000_000
@@ -143,11 +140,12 @@ def _events(text: str, file: str) -> Iterator[Any]:
 
     try:
         yield from YAML(typ="safe", pure=True).parse(text)
-    except YAMLError as error:
+    except (YAMLError, AssertionError) as error:
+        # The parser asserts that a %YAML directive names a version that it knows.
         raise _syntax_error(error, text, file) from error
 
 
-def _syntax_error(error: YAMLError, text: str, file: str) -> ScenarioError:
+def _syntax_error(error: Exception, text: str, file: str) -> ScenarioError:
     """Say a parser's complaint in the user's words."""
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     number = mark.line if mark else 0

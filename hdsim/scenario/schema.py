@@ -33,6 +33,16 @@ def json_schema(model: type[BaseModel]) -> Schema:
     for definition in definitions.values():
         _tell_units(definition)
     partial = {f"{key}.partial": _loosened(definition) for key, definition in definitions.items()}
+    for key in [
+        key for key, definition in definitions.items() if "preset" in definition.get("properties", {})
+    ]:
+        # A preset gives what is left out, as an extended file does.
+        partial[f"{key}.whole"] = definitions[key]
+        definitions[key] = {
+            "if": {"required": ["preset"], "properties": {"preset": {"type": "string"}}},
+            "then": {"$ref": f"#/$defs/{key}.partial"},
+            "else": {"$ref": f"#/$defs/{key}.whole"},
+        }
     extends = {
         "type": "string",
         "title": "Extends",
@@ -50,8 +60,11 @@ def json_schema(model: type[BaseModel]) -> Schema:
 
 
 def _tell_units(definition: Schema) -> None:
-    """Put the unit of every property beside it and into its title."""
+    """Put the unit of every property beside it and into its title; say what a section without words holds."""
     for name, entry in definition.get("properties", {}).items():
+        choice = entry.get("discriminator")
+        if choice and "description" not in entry:
+            entry["description"] = f"Its {choice['propertyName']} is one of {', '.join(choice['mapping'])}."
         words, unit = split_unit(name)
         if unit and "$ref" not in entry:
             entry["unit"] = unit

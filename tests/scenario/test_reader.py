@@ -117,7 +117,7 @@ def test_every_value_knows_its_line(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
-@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.binary(max_size=200) | st.text(max_size=200).map(lambda text: text.encode("utf-8", "surrogatepass"))
 )
@@ -135,7 +135,7 @@ YAML_PIECES = st.sampled_from(
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=800, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(YAML_PIECES, max_size=30).map("".join))
 def test_random_yaml_is_read_or_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "x.yaml"
@@ -152,7 +152,7 @@ PLAIN = st.recursive(
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(st.text(min_size=1, max_size=6, alphabet="abcdef"), PLAIN, min_size=1, max_size=4))
 def test_what_is_written_is_read_back_the_same(tmp_path: Path, data: dict[str, object]) -> None:
     path = tmp_path / "x.yaml"
