@@ -216,7 +216,7 @@ def test_the_line_contact_is_the_half_spaces_displacement_under_a_hertz_strip():
     b = law.half_width(force)
     assert b == pytest.approx(6.2e-6, rel=0.01)
 
-    # Boussinesq at the middle of the strip: p(x) = p0 sqrt(1 - x^2/b^2), w = 1/(pi E*) int p dx dy / distance.
+    # Boussinesq at the middle of the strip: p = p0 sqrt(1 - x^2/b^2), w = 1/(pi E*) int p dx dy / r.
     def line(t):  # x = b t^2 on one side; the integral over y along the strip is 2 asinh(l / 2x)
         x = b * t * t
         return math.sqrt(max(0.0, 1 - t**4)) * 2 * math.asinh(length / (2 * x)) * 2 * b * t if x else 0.0
