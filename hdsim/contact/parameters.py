@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, FilePath
 
 from hdsim.parts import Parameters
 
@@ -118,11 +118,12 @@ class TableLawParameters(Parameters):
     """Force over penetration from a CSV file."""
 
     law: Literal["table"]
-    file: str
-    """CSV file with the columns ``penetration_m`` and ``force_n``, both rising from 0."""
+    file: FilePath
+    """CSV file with the columns ``penetration_m`` and ``force_n``, both rising from 0; a scenario looks
+    for it relative to the file in which it is written."""
 
     def build(self, surface: Flank) -> ContactLaw:
-        """The law; the surface is not used. A relative path counts from the working directory."""
+        """The law; the surface is not used."""
         from hdsim.contact.measured import TableLaw
 
         return TableLaw.from_csv(self.file)

@@ -90,3 +90,20 @@ def test_the_environment_changes_nothing(folder: Path, monkeypatch: pytest.Monke
         monkeypatch.setenv(name, "other")
     monkeypatch.setenv("LANG", "C")
     assert Scenario.from_yaml(folder / "base.yaml").to_yaml() == before
+
+
+def test_a_contact_table_belongs_to_the_file_that_names_it_and_must_exist(folder: Path) -> None:
+    base, top = folder / "base.yaml", folder / "other" / "top.yaml"
+    base.write_text(
+        TEXT.replace(
+            "{model: teeth, tooth_bending_stiffness_n_per_m: null}",
+            "{model: teeth, contact: {law: table, file: data/contact.csv}}",
+        )
+    )
+    with pytest.raises(hdsim.InputError) as caught:
+        Scenario.from_yaml(top)
+    # The base is named as the extending file reaches it.
+    assert str(caught.value).startswith(f"{base}:1: drive.mesh.contact.file: found no such file")
+    (folder / "data" / "contact.csv").write_text("penetration_m,force_n\n0,0\n1e-6,50\n")
+    contact = Scenario.from_yaml(top).drive.mesh.contact  # type: ignore[union-attr]
+    assert contact.file == folder / "data" / "contact.csv"
