@@ -130,3 +130,29 @@ def recover(log: Path, out: Path | None) -> None:
     console.print(topics)
     for lost in report.lost:
         console.print(f"lost: {lost}", style="yellow", highlight=False, markup=False)
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option("--log", type=click.Path(path_type=Path), help="Fit the layout to this log.")
+def layout(name: str | None, log: Path | None) -> None:
+    """Print the layout NAME as JSON for the viewer; without NAME, list the layouts.
+
+    With --log it leaves out what the log does not have, and plays at a speed that suits the run's length.
+    """
+    import hdsim.log.layout as layouts
+
+    if name is None:
+        for known, build in layouts.LAYOUTS.items():
+            click.echo(f"{known:20}{(build.__doc__ or '').splitlines()[0]}")
+        return
+    if log is None:
+        click.echo(layouts.to_json(layouts.build_layout(name)), nl=False)
+        return
+    from hdsim.log.info import info_log
+
+    about = info_log(log)
+    made = layouts.build_layout(
+        name, topics=about.fields, duration=about.duration, drive_radius=about.drive_radius
+    )
+    click.echo(layouts.to_json(made), nl=False)

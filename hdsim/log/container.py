@@ -11,7 +11,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import IO, Any, Protocol
+from typing import IO, Any, Literal, Protocol
 
 import numpy as np
 import zstandard
@@ -69,11 +69,11 @@ class Container:
     chunk brings them: a channel without messages is an error to strict readers.
     """
 
-    def __init__(self, stream: IO[bytes], header_library: str | None = None) -> None:
+    def __init__(self, stream: IO[bytes], compression: Literal["zstd", "none"] = "zstd") -> None:
         self._stream = stream
         self._position = 0
         self._crc = 0
-        self._compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL)
+        self._compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL) if compression == "zstd" else None
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
         self._chunk_indexes: list[bytes] = []
@@ -83,7 +83,7 @@ class Container:
         self._start: int | None = None
         self._end = 0
         self._put(MAGIC)
-        self._put(encode(records.Header(profile="", library=header_library or library())))
+        self._put(encode(records.Header(profile="", library=library())))
 
     def _put(self, data: bytes | bytearray | memoryview) -> int:
         at = self._position
@@ -91,6 +91,16 @@ class Container:
         self._crc = zlib.crc32(data, self._crc)
         self._position += len(data)
         return at
+
+    @property
+    def topics(self) -> list[str]:
+        """Topics that have messages."""
+        return [channel.topic for channel in self._channels.values()]
+
+    @property
+    def duration(self) -> float:
+        """Time from the first message to the last, in s."""
+        return 0.0 if self._start is None else (self._end - self._start) / 1e9
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system."""
@@ -142,7 +152,12 @@ class Container:
             channels: channels that it brings or uses.
             compressed: compression and bytes, if they exist already.
         """
-        compression, packed = compressed or ("zstd", self._compressor.compress(data))
+        if compressed is not None:
+            compression, packed = compressed
+        elif self._compressor is not None:
+            compression, packed = "zstd", self._compressor.compress(data)
+        else:
+            compression, packed = "", bytes(data)
         times = [e["log_time"] for e in indexes.by_channel.values()]
         start, end = int(min(t.min() for t in times)), int(max(t.max() for t in times))
         chunk = records.Chunk(

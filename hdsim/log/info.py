@@ -11,6 +11,7 @@ from mcap.opcode import Opcode
 from hdsim.errors import InputError
 from hdsim.log import naming, scan
 from hdsim.log.naming import ColumnSpec
+from hdsim.log.schemas import message_class
 
 
 @dataclass
@@ -29,6 +30,7 @@ class LogInfo:
         metadata: by record name.
         attachments: sizes in bytes by name.
         chunks: number of chunks.
+        fields: fields of the messages, by topic, of every topic that has messages.
     """
 
     path: Path
@@ -42,6 +44,12 @@ class LogInfo:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, int] = field(default_factory=dict)
     chunks: int = 0
+    fields: dict[str, list[str]] = field(default_factory=dict)
+
+    @property
+    def drive_radius(self) -> float:
+        """Pitch radius of the drive in m, as the scene says; 0.025 without one."""
+        return float(self.metadata.get("hdsim.scene", {}).get("pitch_radius_m", "0.025"))
 
     @property
     def duration(self) -> float:
@@ -63,7 +71,7 @@ def info_log(path: str | Path) -> LogInfo:
     data = scan.map_file(path)
     info = LogInfo(Path(path), len(data))
     statistics: records.Statistics | None = None
-    schemas: dict[int, str] = {}
+    schemas: dict[int, records.Schema] = {}
     channels: dict[int, records.Channel] = {}
     try:
         for span in scan.walk(data):
@@ -81,7 +89,7 @@ def info_log(path: str | Path) -> LogInfo:
                     info.attachments[attachment.name] = len(attachment.data)
                 case Opcode.SCHEMA:
                     schema = scan.parse(records.Schema, data, span)
-                    schemas[schema.id] = schema.name
+                    schemas[schema.id] = schema
                 case Opcode.CHANNEL:
                     channel = scan.parse(records.Channel, data, span)
                     channels[channel.id] = channel
@@ -99,5 +107,17 @@ def info_log(path: str | Path) -> LogInfo:
     info.start_ns, info.end_ns = statistics.message_start_time, statistics.message_end_time
     for id, channel in channels.items():
         info.messages[channel.topic] = statistics.channel_message_counts.get(id, 0)
-        info.message_types[channel.topic] = schemas.get(channel.schema_id, "")
+        schema_or_none = schemas.get(channel.schema_id)
+        info.message_types[channel.topic] = schema_or_none.name if schema_or_none else ""
+        if info.messages[channel.topic]:
+            info.fields[channel.topic] = _fields(schema_or_none)
     return info
+
+
+def _fields(schema: records.Schema | None) -> list[str]:
+    if schema is None or schema.encoding != "protobuf":
+        return []
+    try:
+        return [f.name for f in message_class(schema.name, schema.data).DESCRIPTOR.fields]
+    except ValueError:
+        return []

@@ -29,7 +29,9 @@ PREFIX = "/hd/"
 STATIC_TOPIC = "/hd/static"
 EVENT_TOPIC = "/hd/events"
 VIEW_SUFFIX = "_view"
-VIEWED_TABLE = "state"
+LOOP_SUFFIX = "_loop"
+VIEWED_TABLES = ("state", "measured", "before", "after")
+"""Tables that viewers plot: runs, alone or held against each other."""
 PROTOBUF_PACKAGE = "hdsim"
 
 RUN_RECORD = "hdsim.run"
@@ -38,7 +40,10 @@ INCOMPLETE_RECORD = "hdsim.incomplete"
 RECOVERED_RECORD = "hdsim.recovered"
 TABLE_RECORD = "hdsim.table."
 
-RESERVED_TABLES = frozenset({"static", "events", "scene", "scene_static", VIEWED_TABLE + VIEW_SUFFIX})
+RESERVED_TABLES = frozenset(
+    {"static", "events", "scene", "scene_static", "transforms"}
+    | {table + suffix for table in VIEWED_TABLES for suffix in (VIEW_SUFFIX, LOOP_SUFFIX)}
+)
 
 _LATEST_S = 7e9
 _EARLIEST_S = -1.5e9

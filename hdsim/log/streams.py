@@ -59,7 +59,7 @@ class TableStream(_Stream):
         schema_id: schema id.
         message_type: protobuf type.
         columns: fields of the message after ``time``.
-        description: the columns as JSON, for the channel's metadata.
+        metadata: the channel's metadata.
         time: whether the message begins with the time in s.
     """
 
@@ -71,7 +71,7 @@ class TableStream(_Stream):
         schema_id: int,
         message_type: str,
         columns: Sequence[ColumnSpec],
-        description: str,
+        metadata: dict[str, str],
         *,
         time: bool = True,
     ) -> None:
@@ -81,7 +81,7 @@ class TableStream(_Stream):
             encoding=_ENCODING,
             data=schemas.table_schema(message_type, columns, time=time),
         )
-        super().__init__(container, channel, topic, schema, {"columns": description})
+        super().__init__(container, channel, topic, schema, metadata)
         self.columns = list(columns)
         self.last_time: float | None = None
         repeated = ([False] if time else []) + [c.repeated for c in columns]

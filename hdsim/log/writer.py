@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from hdsim.log import naming
 from hdsim.log.container import Container
 from hdsim.log.streams import MessageStream, TableStream
 from hdsim.log.view import MinMaxView
+from hdsim.log.viewing import LoopStream, ViewStream
 from hdsim.recording import Event, Table
 
 if TYPE_CHECKING:
@@ -51,6 +52,11 @@ class LogWriter:
         attachments: file names to contents, such as the scenario's YAML text.
         view_rate_hz: samples a second in the decimated twin of the state; `view_rate` gives one that suits
             a run's length. Infinite keeps every sample.
+        compression: of the chunks.
+        layouts: attach the viewer's layouts that fit the log when it is closed.
+
+    Attributes:
+        drive_radius: pitch radius in m, for the camera of the layouts; a scene sets it.
 
     Raises:
         InputError: the file cannot be made.
@@ -63,6 +69,8 @@ class LogWriter:
         metadata: Mapping[str, str],
         attachments: Mapping[str, bytes | str] | None = None,
         view_rate_hz: float = DEFAULT_VIEW_RATE_HZ,
+        compression: Literal["zstd", "none"] = "zstd",
+        layouts: bool = True,
     ) -> None:
         self.path = Path(path)
         self.partial = self.path.with_name(self.path.name + ".partial")
@@ -77,15 +85,17 @@ class LogWriter:
         except OSError as error:
             raise InputError(f"{self.path} cannot be written: {error.strerror}") from None
         self._view_rate = view_rate_hz
-        self._view: MinMaxView | None = None
-        self._view_stream: TableStream | None = None
+        self._views: dict[str, ViewStream] = {}
+        self._topics: dict[str, list[str]] = {}
+        self._layouts = layouts
+        self.drive_radius = 0.025
         self._channels = 0
         self._tables: dict[str, TableStream] = {}
         self._messages: dict[str, MessageStream] = {}
         self._schemas: dict[str, int] = {}
         self._last_event_ns = 0
         self._open = True
-        self._container = Container(self._file)
+        self._container = Container(self._file, compression)
         self._container.metadata(naming.RUN_RECORD, metadata)
         for name, content in (attachments or {}).items():
             data = content.encode() if isinstance(content, str) else content
@@ -130,7 +140,7 @@ class LogWriter:
         """Write the next rows of a table.
 
         Args:
-            name: the table; ``state`` gets a decimated twin for viewers.
+            name: the table; ``state`` gets a decimated twin and a loop for viewers.
             block: rows that follow the last ones; the first block sets the columns, their order and shapes.
 
         Raises:
@@ -141,8 +151,6 @@ class LogWriter:
         stream = self._tables.get(name)
         if stream is None:
             stream = self._add_table(name, naming.topic_of(name), specs, specs)
-            if name == naming.VIEWED_TABLE:
-                self._view = MinMaxView(self._view_rate)
         columns = [np.asarray(c.values, np.float64) for c in block.columns.values()]
         stream.check(name, time, specs, columns)
         log_times = naming.to_ns(time)
@@ -153,8 +161,8 @@ class LogWriter:
             rows = slice(begin, end)
             piece = [c[rows] for c in columns]
             full = stream.append(time[rows], log_times[rows], piece)
-            if name == naming.VIEWED_TABLE and self._view is not None:
-                self._write_view(*self._view.feed(time[rows], piece))
+            if name in self._views:
+                self._views[name].feed(time[rows], piece)
             if full:
                 self._flush_messages()
             begin = end
@@ -216,10 +224,17 @@ class LogWriter:
         for log_time, payload in zip(log_times, payloads, strict=True):
             stream.append(log_time, payload)
 
+    def write_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Write a metadata record of its own."""
+        self._check_open()
+        self._container.metadata(name, values)
+
     def flush(self) -> None:
         """Write out what waits for its chunk to fill, so that a killed process would not lose it."""
         for stream in self._tables.values():
             stream.flush()
+        for view in self._views.values():
+            view.flush()
         self._flush_messages()
         self._container.flush()
 
@@ -254,28 +269,37 @@ class LogWriter:
         time: bool = True,
     ) -> TableStream:
         self._check_open()
-        message_type = naming.message_type_of(name)
-        schema_id = self._schemas.setdefault(message_type, len(self._schemas) + 1)
         text = naming.columns_to_json(described)
         self._container.metadata(naming.TABLE_RECORD + name, {"topic": topic, "columns": text})
 
-        def make(topic: str) -> TableStream:
+        def make(
+            topic: str, kind: str, fields: Sequence[naming.ColumnSpec], about: dict[str, str]
+        ) -> TableStream:
+            schema_id = self._schemas.setdefault(kind, len(self._schemas) + 1)
+            self._topics[topic] = [*(["time"] if time else []), *(f.field for f in fields)]
             return TableStream(
-                self._container, self._next_channel(), topic, schema_id, message_type, layout, text, time=time
+                self._container, self._next_channel(), topic, schema_id, kind, fields, about, time=time
             )
 
-        self._tables[name] = stream = make(topic)
-        if name == naming.VIEWED_TABLE:
-            self._view_stream = make(topic + naming.VIEW_SUFFIX)
+        message_type = naming.message_type_of(name)
+        self._tables[name] = stream = make(topic, message_type, layout, {"columns": text})
+        if name in naming.VIEWED_TABLES:
+            about = {"view_of": topic}
+            loop_type = naming.message_type_of("loop")
+            loop = LoopStream.of(layout, lambda f: make(topic + naming.LOOP_SUFFIX, loop_type, f, about))
+            twin = make(topic + naming.VIEW_SUFFIX, message_type, layout, about)
+            self._views[name] = ViewStream(MinMaxView(self._view_rate), twin, loop)
         return stream
 
-    def _write_view(self, time: Array, columns: list[Array]) -> None:
-        stream = self._view_stream
-        begin = 0
-        while stream is not None and begin < len(time):
-            rows = slice(begin, begin + stream.room)
-            stream.append(time[rows], naming.to_ns(time[rows]), [c[rows] for c in columns])
-            begin = rows.stop
+    def _attach_layouts(self) -> None:
+        """Layouts come last: what they can show is known only then, and `hdsim layout` makes them again."""
+        from hdsim.log.layout import layouts_of_log
+
+        if not self._layouts:
+            return
+        topics = {topic: self._topics.get(topic, []) for topic in self._container.topics}
+        for name, text in layouts_of_log(topics, self._container.duration, self.drive_radius).items():
+            self._container.attachment(name, "application/json", text.encode(), naming.EPOCH_NS)
 
     def _flush_messages(self) -> None:
         for stream in self._messages.values():
@@ -289,14 +313,12 @@ class LogWriter:
             )
         self._open = False
         try:
-            for name, stream in self._tables.items():
+            for stream in self._tables.values():
                 stream.flush()
-                if name == naming.VIEWED_TABLE and self._view is not None and self._view_stream is not None:
-                    rest = self._view.finish()
-                    if rest is not None:
-                        self._write_view(*rest)
-                    self._view_stream.flush()
+            for view in self._views.values():
+                view.finish()
             self._flush_messages()
+            self._attach_layouts()
             if statistics:
                 self._container.metadata(naming.STATISTICS_RECORD, statistics)
             if incomplete is not None:
@@ -308,7 +330,11 @@ class LogWriter:
 
 
 def write_log(
-    recording: Recording, path: str | Path, *, attachments: Mapping[str, bytes | str] | None = None
+    recording: Recording,
+    path: str | Path,
+    *,
+    attachments: Mapping[str, bytes | str] | None = None,
+    scene: bool = True,
 ) -> Path:
     """Write a whole recording.
 
@@ -317,6 +343,7 @@ def write_log(
         path: where to.
         attachments: file names to contents. The text under ``scenario`` in the metadata is attached as
             ``scenario.yaml`` unless there is an attachment of that name.
+        scene: draw the drive, if the state has the angles of motor and output.
 
     Returns:
         The log's path.
@@ -324,14 +351,18 @@ def write_log(
     files = dict(attachments or {})
     if "scenario" in recording.metadata:
         files.setdefault("scenario.yaml", recording.metadata["scenario"])
-    state = recording.tables.get(naming.VIEWED_TABLE)
+    longest = max((recording.tables.get(name, Table(np.zeros(0))) for name in naming.VIEWED_TABLES), key=len)
     rate = np.inf
-    if state is not None and len(state) > VIEW_SAMPLES:
-        rate = view_rate(float(state.time[-1] - state.time[0]))
+    if len(longest) > VIEW_SAMPLES:
+        rate = view_rate(float(longest.time[-1] - longest.time[0]))
     with LogWriter(path, metadata=recording.metadata, attachments=files, view_rate_hz=rate) as log:
         log.write_static(recording.static)
         for event in recording.events:
             log.write_event(event)
         for name, table in recording.tables.items():
             log.write(name, table)
+        if scene:
+            from hdsim.log.scene import write_scene
+
+            write_scene(log, recording)
     return Path(path)

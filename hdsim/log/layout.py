@@ -1,0 +1,402 @@
+"""Layouts for viewers of the Foxglove family: which panels show what, as JSON that they import.
+
+    python -m hdsim.log.layout FOLDER      writes all of them
+
+The format is the layout export of Foxglove and Lichtblick: panels by id, a tree of splits, a playback speed.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hdsim.errors import InputError
+
+STATE = "/hd/state_view"
+TEETH = "/hd/teeth"
+LOOP = "/hd/state_loop"
+STATIC = "/hd/static"
+EVENTS = "/hd/events"
+SCENE = "/hd/scene"
+SCENE_STATIC = "/hd/scene_static"
+
+Topics = Mapping[str, Collection[str]]
+"""Fields of every topic of a log, by topic."""
+
+_SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+_SHORT_S, _LONG_S = 10.0, 60.0
+_CAMERA_DISTANCE = 5.0
+"""Of the camera from the drive, in pitch radii."""
+
+
+def playback_speed(duration: float) -> float:
+    """Speed at which a run of ``duration`` s is pleasant to watch: 10 s to a minute where viewers can.
+
+    Viewers play at 0.01 to 5 times real time.
+    """
+    if duration <= 0:
+        return 1.0
+    if duration < _SHORT_S:
+        return max((s for s in _SPEEDS if duration / s >= _SHORT_S), default=_SPEEDS[0])
+    return min((s for s in _SPEEDS if s >= 1 and duration / s <= _LONG_S), default=_SPEEDS[-1])
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel: its type and title, its settings, and the message paths that it draws."""
+
+    kind: str
+    title: str
+    settings: Mapping[str, Any]
+    paths: tuple[str, ...] = ()
+
+    @property
+    def id(self) -> str:
+        """Name in the layout."""
+        return f"{self.kind}!{re.sub('[^a-z0-9]+', '_', self.title.split('[')[0].lower()).strip('_')}"
+
+
+@dataclass(frozen=True)
+class Split:
+    """Parts side by side (``row``) or over each other (``column``), with their shares of the room."""
+
+    direction: str
+    parts: tuple[tuple[float, Panel | Split], ...]
+
+
+def row(*parts: tuple[float, Panel | Split]) -> Split:
+    """Parts side by side."""
+    return Split("row", parts)
+
+
+def column(*parts: tuple[float, Panel | Split]) -> Split:
+    """Parts over each other."""
+    return Split("column", parts)
+
+
+def plot(title: str, *paths: str, over: str | None = None, dots: bool = False) -> Panel:
+    """Values over time; with ``over``, arrays over another of the message, or over ``index``."""
+    lines = [
+        {
+            "value": path,
+            "enabled": True,
+            "timestampMethod": "receiveTime",
+            "label": path.split(".", 1)[1],
+            "showLine": not dots,
+        }
+        for path in paths
+    ]
+    settings: dict[str, Any] = {
+        "paths": lines,
+        "showLegend": True,
+        "legendDisplay": "floating",
+        "showPlotValuesInLegend": False,
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+        "isSynced": over is None,
+        "xAxisVal": "timestamp" if over is None else "index" if over == "index" else "currentCustom",
+        "sidebarDimension": 240,
+    }
+    drawn = paths
+    if over not in (None, "index"):
+        settings["xAxisPath"] = {"value": over, "enabled": True}
+        drawn = (*paths, str(over))
+    return Panel("Plot", title, settings, drawn)
+
+
+def scene(title: str = "Drive") -> Panel:
+    """The three-dimensional scene, seen along the axis."""
+    settings = {
+        "cameraState": {
+            "perspective": False,
+            "phi": 0,
+            "thetaOffset": 0,
+            "targetOffset": [0, 0, 0],
+            "target": [0, 0, 0],
+            "targetOrientation": [0, 0, 0, 1],
+            "fovy": 45,
+            "near": 0.001,
+            "far": 10,
+        },
+        "followMode": "follow-none",
+        "followTf": "world",
+        "scene": {
+            "backgroundColor": "#111318",
+            "transforms": {"axisScale": 0, "showLabel": False, "visible": False},
+        },
+        "transforms": {},
+        "topics": {SCENE: {"visible": True}, SCENE_STATIC: {"visible": True}},
+        "layers": {},
+        "publish": {},
+        "imageMode": {},
+    }
+    return Panel("3D", title, settings, (SCENE, SCENE_STATIC))
+
+
+def gauge(title: str, path: str, low: float, high: float) -> Panel:
+    """One number as a needle."""
+    settings = {
+        "path": path,
+        "minValue": low,
+        "maxValue": high,
+        "colorMap": "red-yellow-green",
+        "colorMode": "colormap",
+        "gradient": ["#0000ff", "#ff00ff"],
+        "reverse": False,
+    }
+    return Panel("Gauge", title, settings, (path,))
+
+
+def lamp(title: str, path: str, below: float, text: str, otherwise: str) -> Panel:
+    """A field that turns red with ``text`` while a number is below a limit."""
+    settings = {
+        "path": path,
+        "style": "background",
+        "fallbackColor": "#339933",
+        "fallbackLabel": otherwise,
+        "rules": [{"operator": "<", "rawValue": str(below), "color": "#ee2222", "label": text}],
+    }
+    return Panel("Indicator", title, settings, (path,))
+
+
+def events(title: str = "Events") -> Panel:
+    """The events as they come."""
+    settings = {"searchTerms": [], "minLogLevel": 1, "topicToRender": EVENTS, "nameFilter": {}}
+    return Panel("RosOut", title, settings, (EVENTS,))
+
+
+def _motion() -> Panel:
+    return plot("Output angle [rad]", f"{STATE}.output_angle", f"{STATE}.reference_angle")
+
+
+def _torques() -> Panel:
+    return plot("Torque at the output [N m]", f"{STATE}.output_torque", f"{STATE}.load_torque")
+
+
+def _profile() -> Panel:
+    return plot(
+        "Tooth force now [N] over angle from the major axis [rad]",
+        f"{TEETH}.normal_force[:]",
+        over=f"{TEETH}.angle[:]",
+        dots=True,
+    )
+
+
+def _loop() -> Panel:
+    return plot("Torque [N m] over twist [rad]", f"{LOOP}.output_torque[:]", over=f"{LOOP}.twist[:]")
+
+
+def _contact_lamp() -> Panel:
+    return lamp("Contact", f"{STATE}.engaged_share", 0.005, "IN THE GAP", "IN CONTACT")
+
+
+def overview() -> Split:
+    """The drive turning, where it should be, how far off it is, and what loads it."""
+    errors = plot("Error [rad]", f"{STATE}.tracking_error", f"{STATE}.transmission_error")
+    small = row((50, gauge("Engaged share", f"{STATE}.engaged_share", 0, 1)), (50, _contact_lamp()))
+    return row(
+        (40, column((60, scene()), (15, small), (25, events()))),
+        (30, column((33, _motion()), (33, errors), (34, _torques()))),
+        (
+            30,
+            column(
+                (33, plot("Motor torque [N m]", f"{STATE}.motor_torque", f"{STATE}.input_friction_torque")),
+                (33, _profile()),
+                (34, _loop()),
+            ),
+        ),
+    )
+
+
+def positioning_error() -> Split:
+    """Where the error of the output comes from."""
+    return row(
+        (
+            35,
+            column(
+                (34, plot("Transmission error [rad]", f"{STATE}.transmission_error")),
+                (33, plot("Tracking error [rad]", f"{STATE}.tracking_error")),
+                (33, plot("Kinematic error [rad]", f"{STATE}.kinematic_error")),
+            ),
+        ),
+        (35, column((34, plot("Twist [rad]", f"{STATE}.twist")), (33, _torques()), (33, _loop()))),
+        (30, column((55, scene()), (25, _motion()), (20, events()))),
+    )
+
+
+def tooth_contact() -> Split:
+    """Which teeth carry the load."""
+    some = [f"{TEETH}.normal_force[{tooth}]" for tooth in (0, 5, 10)]
+    return row(
+        (45, column((70, scene()), (30, _profile()))),
+        (
+            55,
+            column(
+                (30, plot("Three teeth over time [N]", *some)),
+                (25, plot("Engaged share", f"{STATE}.engaged_share")),
+                (
+                    25,
+                    plot(
+                        "Half-gap of each tooth [m]", f"{STATIC}.tooth_half_gap[:]", over="index", dots=True
+                    ),
+                ),
+                (20, row((60, _loop()), (40, _contact_lamp()))),
+            ),
+        ),
+    )
+
+
+def diagnose() -> Split:
+    """A measured run, and the model before and after an effect was added to it."""
+
+    def three(title: str, channel: str) -> Panel:
+        return plot(title, *(f"/hd/{run}_view.{channel}" for run in ("measured", "before", "after")))
+
+    return row(
+        (
+            50,
+            column(
+                (34, three("Transmission error [rad]", "transmission_error")),
+                (33, three("Output torque [N m]", "output_torque")),
+                (33, three("Motor torque [N m]", "motor_torque")),
+            ),
+        ),
+        (
+            50,
+            column(
+                (34, three("Output angle [rad]", "output_angle")),
+                (33, three("Motor velocity [rad/s]", "motor_velocity")),
+                (33, events()),
+            ),
+        ),
+    )
+
+
+LAYOUTS: dict[str, Callable[[], Split]] = {
+    "overview": overview,
+    "positioning-error": positioning_error,
+    "tooth-contact": tooth_contact,
+    "diagnose": diagnose,
+}
+
+
+def split_path(path: str) -> tuple[str, str]:
+    """Topic and field of a message path: ``/hd/teeth.angle[:]`` is ``/hd/teeth`` and ``angle``."""
+    topic, _, rest = path.partition(".")
+    return topic, rest.partition("[")[0]
+
+
+def build_layout(
+    name: str, *, topics: Topics | None = None, duration: float | None = None, drive_radius: float = 0.025
+) -> dict[str, Any]:
+    """A layout as the viewer imports it.
+
+    Args:
+        name: one of `LAYOUTS`.
+        topics: what a log has; lines and panels that it cannot fill are left out. None keeps all.
+        duration: length of the run in s, for the playback speed.
+        drive_radius: pitch radius in m, for the distance of the camera.
+
+    Raises:
+        InputError: an unknown name, or a log that has nothing to show in this layout.
+    """
+    try:
+        tree: Panel | Split | None = LAYOUTS[name]()
+    except KeyError:
+        raise InputError(f"no layout {name!r}; there are: {', '.join(LAYOUTS)}") from None
+    if topics is not None:
+        tree = _prune(tree, topics)
+    if tree is None or all(panel.kind == "RosOut" for panel in _panels(tree)):
+        raise InputError(f"the log has no topic that layout {name!r} shows")
+    return {
+        "configById": {p.id: _settings(p, drive_radius) for p in _panels(tree)},
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": playback_speed(duration) if duration is not None else 1.0},
+        "layout": _nest(tree),
+    }
+
+
+def layouts_of_log(topics: Topics, duration: float, drive_radius: float = 0.025) -> dict[str, str]:
+    """All layouts that have something to show in a log, by file name, as JSON."""
+    found = {}
+    for name in LAYOUTS:
+        try:
+            layout = build_layout(name, topics=topics, duration=duration, drive_radius=drive_radius)
+        except InputError:
+            continue
+        found[f"layout-{name}.json"] = to_json(layout)
+    return found
+
+
+def to_json(layout: Mapping[str, Any]) -> str:
+    """A layout as text."""
+    return json.dumps(layout, indent=1, allow_nan=False) + "\n"
+
+
+def _settings(panel: Panel, drive_radius: float) -> dict[str, Any]:
+    settings = dict(panel.settings)
+    if panel.kind == "3D":
+        settings["cameraState"] = {**settings["cameraState"], "distance": _CAMERA_DISTANCE * drive_radius}
+    return {**settings, "foxglovePanelTitle": panel.title, "lichtblickPanelTitle": panel.title}
+
+
+def _panels(tree: Panel | Split) -> Iterable[Panel]:
+    if isinstance(tree, Panel):
+        yield tree
+    else:
+        for _, part in tree.parts:
+            yield from _panels(part)
+
+
+def _nest(tree: Panel | Split) -> Any:
+    """The viewer splits in two only: the first part against all the others."""
+    if isinstance(tree, Panel):
+        return tree.id
+    (share, first), *rest = tree.parts
+    if not rest:
+        return _nest(first)
+    total = share + sum(s for s, _ in rest)
+    return {
+        "first": _nest(first),
+        "second": _nest(Split(tree.direction, tuple(rest))),
+        "direction": tree.direction,
+        "splitPercentage": round(100 * share / total, 1),
+    }
+
+
+def _has(path: str, topics: Topics) -> bool:
+    topic, field = split_path(path)
+    return topic in topics and (not field or field in topics[topic])
+
+
+def _prune(tree: Panel | Split | None, topics: Topics) -> Panel | Split | None:
+    if isinstance(tree, Split):
+        kept = [(share, _prune(part, topics)) for share, part in tree.parts]
+        parts = tuple((share, part) for share, part in kept if part is not None)
+        return Split(tree.direction, parts) if parts else None
+    if tree is None or not tree.paths:
+        return tree
+    present = [path for path in tree.paths if _has(path, topics)]
+    if tree.kind != "Plot":
+        return tree if present else None
+    lines = [line for line in tree.settings["paths"] if _has(line["value"], topics)]
+    x_path = tree.settings.get("xAxisPath")
+    if not lines or (x_path and not _has(x_path["value"], topics)):
+        return None
+    return Panel(tree.kind, tree.title, {**tree.settings, "paths": lines}, tuple(present))
+
+
+def main(folder: str) -> None:
+    """Write every layout to ``folder``."""
+    for name in LAYOUTS:
+        Path(folder, f"{name}.json").write_text(to_json(build_layout(name)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

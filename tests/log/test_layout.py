@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from driving import drive_run
+
+import hdsim.log
+from hdsim.errors import InputError
+from hdsim.log import commands, info_log, layout, read_attachments, verify_log, write_log
+from hdsim.recording import Recording, Table
+
+SHIPPED = Path(hdsim.log.__file__).parent / "layouts"
+
+
+def message_paths(value):
+    """Every message path and topic in a layout's JSON."""
+    if isinstance(value, dict):
+        for part in value.values():
+            yield from message_paths(part)
+        yield from (key for key in value if key.startswith("/hd/"))
+    elif isinstance(value, list):
+        for part in value:
+            yield from message_paths(part)
+    elif isinstance(value, str) and value.startswith("/hd/"):
+        yield value
+
+
+def leaves(tree):
+    return [tree] if isinstance(tree, str) else [*leaves(tree["first"]), *leaves(tree["second"])]
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """A log that every layout can show."""
+    run = drive_run()
+    tables = {**run.tables, **dict.fromkeys(("measured", "before", "after"), run.state)}
+    recording = Recording(tables, run.static, run.events, run.metadata)
+    return write_log(recording, tmp_path_factory.mktemp("log") / "a.mcap")
+
+
+@pytest.mark.parametrize("name", list(layout.LAYOUTS))
+def test_every_path_of_a_shipped_layout_exists_in_the_log_with_its_type(diagnosed, name):
+    fields = info_log(diagnosed).fields
+    built = json.loads((SHIPPED / f"{name}.json").read_text())
+    paths = list(message_paths(built))
+    assert len(paths) > 3
+    shapes = {c.field: c.repeated for specs in info_log(diagnosed).tables.values() for c in specs}
+    shapes |= {"output_torque": False, "twist": False}
+    for path in paths:
+        topic, field = layout.split_path(path)
+        assert topic in fields, path
+        if field:
+            assert field in fields[topic], path
+            repeated = topic == layout.LOOP or shapes[field]
+            assert bool(re.search(r"\[(:|\d+)\]$", path)) == repeated, path
+
+
+@pytest.mark.parametrize("name", list(layout.LAYOUTS))
+def test_shipped_layouts_are_what_the_builders_make(name):
+    assert (SHIPPED / f"{name}.json").read_text() == layout.to_json(layout.build_layout(name))
+
+
+@pytest.mark.parametrize("name", list(layout.LAYOUTS))
+def test_the_tree_holds_each_panel_once(name):
+    built = layout.build_layout(name)
+    assert sorted(leaves(built["layout"])) == sorted(built["configById"])
+    assert len(built["configById"]) >= 6
+    for settings in built["configById"].values():
+        assert settings["lichtblickPanelTitle"] == settings["foxglovePanelTitle"]
+
+
+def test_logs_carry_the_layouts_that_they_can_fill(tmp_path):
+    run = drive_run(duration=0.2)
+    path = write_log(run, tmp_path / "a.mcap")
+    found = {n: json.loads(t) for n, t in read_attachments(path).items() if n.startswith("layout-")}
+    assert sorted(found) == [
+        "layout-overview.json",
+        "layout-positioning-error.json",
+        "layout-tooth-contact.json",
+    ]
+    for built in found.values():
+        assert built["playbackConfig"]["speed"] == 0.02
+        for path_text in message_paths(built):
+            topic, field = layout.split_path(path_text)
+            assert not field or field in info_log(path).fields[topic]
+
+
+def test_what_a_log_lacks_is_left_out(tmp_path):
+    run = drive_run(duration=0.5)
+    del run.tables["teeth"]
+    del run.static["tooth_half_gap"]
+    for name in ("tracking_error", "reference_angle", "engaged_share", "output_angle"):
+        del run.tables["state"].columns[name]
+    path = write_log(run, tmp_path / "a.mcap")
+    built = json.loads(read_attachments(path)["layout-overview.json"])
+    assert sorted(leaves(built["layout"])) == sorted(built["configById"])
+    assert "3D!drive" not in built["configById"]
+    assert "Indicator!contact" not in built["configById"]
+    (error,) = (s for p, s in built["configById"].items() if p == "Plot!error")
+    assert [line["label"] for line in error["paths"]] == ["transmission_error"]
+
+
+@pytest.mark.parametrize(
+    ("duration", "speed"),
+    [(0.02, 0.01), (0.5, 0.05), (5.0, 0.5), (10.0, 1.0), (60.0, 1.0), (90.0, 2.0), (1800.0, 5.0), (0.0, 1.0)],
+)
+def test_short_runs_play_slowly_and_long_ones_fast(duration, speed):
+    assert layout.playback_speed(duration) == speed
+
+
+def test_an_empty_log_has_no_layout(tmp_path):
+    path = write_log(Recording({"x": Table([0.0])}, metadata={"scenario": "a"}), tmp_path / "a.mcap")
+    assert list(read_attachments(path)) == ["scenario.yaml"]
+    with pytest.raises(InputError, match="no topic that layout 'overview' shows"):
+        layout.build_layout("overview", topics=info_log(path).fields)
+
+
+def test_the_command_prints_a_layout_for_a_log(diagnosed):
+    run = CliRunner().invoke
+    listed = run(commands.layout, [])
+    assert [line.split()[0] for line in listed.output.splitlines()] == list(layout.LAYOUTS)
+    assert json.loads(run(commands.layout, ["overview"]).output) == layout.build_layout("overview")
+    fitted = json.loads(run(commands.layout, ["diagnose", "--log", str(diagnosed)]).output)
+    assert fitted["playbackConfig"]["speed"] == 0.2
+    error = run(commands.layout, ["nothing"]).exception
+    assert isinstance(error, InputError)
+    assert "there are: overview, positioning-error" in str(error)
+    assert verify_log(diagnosed).ok
+
+
+def test_loops_hold_the_last_samples_before_their_time(diagnosed):
+    import numpy as np
+    from mcap.reader import make_reader
+
+    from hdsim.log.schemas import message_class
+
+    run = drive_run()
+    with open(diagnosed, "rb") as file:
+        loops = [
+            message_class(schema.name, schema.data).FromString(message.data)
+            for schema, _, message in make_reader(file).iter_messages([layout.LOOP])
+        ]
+    assert len(loops) == 21
+    for loop in (loops[0], loops[5], loops[-1]):
+        end = int(np.searchsorted(run.time, loop.time)) + 1
+        begin = max(0, end - 1000)
+        np.testing.assert_array_equal(loop.twist[1000 - (end - begin) :], run["twist"][begin:end])
+        np.testing.assert_array_equal(
+            loop.output_torque[1000 - (end - begin) :], run["output_torque"][begin:end]
+        )
+        assert np.isnan(loop.twist[: 1000 - (end - begin)]).all()
