@@ -286,15 +286,15 @@ def static_entities(g: SceneGeometry, at: int, *, with_error: bool) -> list[Any]
     lines = [f"flexspline deflection drawn x{g.deflection_factor:g}"]
     if with_error:
         lines.append(f"red pointer: error of the output x{g.error_factor:g}")
-    lines.append(f"tooth force 0 to {g.largest_force_n:.3g} N:")
     for k, line in enumerate(lines):
-        legend.texts.append(shapes.text(line, (-1.1 * r, (2.15 - 0.14 * k) * r, 0.2 * r), size))
+        legend.texts.append(shapes.text(line, (0.0, (2.15 - 0.14 * k) * r, 0.2 * r), size))
+    height = 2.15 - 0.14 * len(lines)
     steps = np.linspace(0.0, 1.0, 16)
-    colours = np.repeat(shapes.force_colours(steps), 2, axis=0)
-    x = np.repeat(-0.4 + 0.1 * np.arange(16), 2) + np.tile([0.0, 0.1], 16)
-    y = np.full(32, 2.15 - 0.14 * (len(lines) - 1))
-    bar = np.column_stack([x, y, np.full(32, 0.2)]) * r
-    _add_line(legend, shapes.segments(bar, colours, 10.0))
+    x = np.repeat(-0.8 + 0.1 * np.arange(16), 2) + np.tile([0.0, 0.1], 16)
+    bar = np.column_stack([x, np.full(32, height), np.full(32, 0.2)]) * r
+    _add_line(legend, shapes.segments(bar, np.repeat(shapes.force_colours(steps), 2, axis=0), 10.0))
+    for side, words in ((-1.3, "tooth force 0 N"), (1.2, f"{g.largest_force_n:.3g} N")):
+        legend.texts.append(shapes.text(words, (side * r, height * r, 0.2 * r), size))
 
     entities = [spline, generator, output, legend]
     if with_error:
