@@ -1,0 +1,1 @@
+"""Studies: bench procedures on simulated drives, and what comes out of them."""

@@ -1,0 +1,1 @@
+"""Bench procedures: scenario, metrics and picture; importing this package registers them."""

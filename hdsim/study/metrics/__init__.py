@@ -1,0 +1,1 @@
+"""Figures of merit, each by its standard; importing this package registers them."""

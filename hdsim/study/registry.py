@@ -1,0 +1,178 @@
+"""What a study can measure: metrics and bench procedures, found by name.
+
+A metric is one number of one run; a procedure is the scenario of a bench test, the metrics that it is made
+for, and its picture. Both register themselves where they are defined; ``metrics()`` and ``procedures()``
+import those modules when they are first asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from hdsim.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from hdsim.recording import Recording
+    from hdsim.scenario import Scenario
+
+T = TypeVar("T")
+Measure = Callable[["Recording", "Scenario"], float]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number of a run.
+
+    Args:
+        name: how a study asks for it.
+        unit: unit of the value, as in ``arcsec`` or ``N m/rad``; ``1`` for a pure number.
+        description: one line that says what it is.
+        source: the standard, manual or paper that defines it.
+        measure: the function.
+    """
+
+    name: str
+    unit: str
+    description: str
+    source: str
+    measure: Measure
+
+    def __call__(self, recording: Recording, scenario: Scenario) -> float:
+        """The value for a run.
+
+        Raises:
+            InputError: the run does not contain what the metric is about (no reversal, no dwell, ...).
+        """
+        return self.measure(recording, scenario)
+
+
+@dataclass(frozen=True)
+class BenchRun:
+    """A run of a procedure: the options it was built with, its scenario and what came out."""
+
+    options: Mapping[str, Any]
+    scenario: Scenario
+    recording: Recording
+
+
+class Build(Protocol):
+    """Builds the scenario of a procedure."""
+
+    def __call__(
+        self,
+        drive: Mapping[str, Any],
+        *,
+        effects: Mapping[str, Any] | None = None,
+        run: Mapping[str, Any] | None = None,
+        **options: Any,
+    ) -> Scenario:
+        """The bench test of a drive.
+
+        Args:
+            drive: section ``drive`` of a scenario, e.g. ``{"preset": "seed-2021"}``.
+            effects: section ``effects``; none when left out.
+            run: fields of the section ``run`` that replace the procedure's own (``seed``, ``rtol``, ...).
+            **options: the procedure's own, listed in its docstring.
+        """
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """A test of the test bench.
+
+    Args:
+        name: how the command line asks for it.
+        title: what it is, for people.
+        source: the standard or manual that it follows.
+        build: scenario for a drive and options.
+        metrics: names of the metrics that it is made for.
+        plot: picture of its runs, one for each of ``variants``.
+        variants: the options of each run that the picture shows; one run with the defaults as a rule.
+    """
+
+    name: str
+    title: str
+    source: str
+    build: Build
+    metrics: tuple[str, ...]
+    plot: Callable[[Sequence[BenchRun]], Figure]
+    variants: tuple[Mapping[str, Any], ...] = field(default=({},))
+
+
+_metrics: dict[str, Metric] = {}
+_procedures: dict[str, Procedure] = {}
+
+
+def metric(name: str, unit: str, description: str, source: str) -> Callable[[Measure], Metric]:
+    """Register a function ``(recording, scenario) -> float`` as a metric."""
+
+    def register(measure: Measure) -> Metric:
+        if name in _metrics:
+            raise ValueError(f"there are two metrics {name!r}")
+        _metrics[name] = Metric(name, unit, description, source, measure)
+        return _metrics[name]
+
+    return register
+
+
+def procedure(given: Procedure) -> Procedure:
+    """Register a bench procedure."""
+    if given.name in _procedures:
+        raise ValueError(f"there are two procedures {given.name!r}")
+    _procedures[given.name] = given
+    return given
+
+
+def metrics() -> dict[str, Metric]:
+    """Every metric by name."""
+    import hdsim.study.metrics  # noqa: F401 - importing registers
+
+    return dict(_metrics)
+
+
+def procedures() -> dict[str, Procedure]:
+    """Every bench procedure by name."""
+    import hdsim.study.bench  # noqa: F401 - importing registers
+
+    return dict(_procedures)
+
+
+def find_metric(name: str) -> Metric:
+    """The metric of that name.
+
+    Raises:
+        InputError: there is none; the message names the nearest.
+    """
+    return _found("metric", name, metrics())
+
+
+def find_procedure(name: str) -> Procedure:
+    """The procedure of that name.
+
+    Raises:
+        InputError: there is none; the message names the nearest.
+    """
+    return _found("procedure", name, procedures())
+
+
+def measure(names: Sequence[str], recording: Recording, scenario: Scenario) -> dict[str, float]:
+    """Several metrics of one run, by name.
+
+    Raises:
+        InputError: an unknown metric, or one that the run does not contain.
+    """
+    return {name: find_metric(name)(recording, scenario) for name in names}
+
+
+def _found(kind: str, name: str, known: Mapping[str, T]) -> T:
+    if name in known:
+        return known[name]
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, known, 3)
+    hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
+    raise InputError(f"unknown {kind} {name!r}; {hint}there are: {', '.join(known)}")
