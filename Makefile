@@ -1,0 +1,59 @@
+# make run: simulate the seed drive.  make test: check everything.  Both set up .venv when it is missing or outdated.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/installed
+WORKERS ?= 2
+
+.DEFAULT_GOAL := help
+.PHONY: help run test test-fast check setup lock schema picture clean
+
+help:
+	@echo "make run        simulate the seed drive; the log and the picture go to logs/"
+	@echo "make test       lint, types and all tests"
+	@echo "make test-fast  the same without the slow studies"
+	@echo "make setup      only install what is needed into $(VENV)"
+	@echo "make lock       resolve the development set anew (needs uv)"
+	@echo "make schema     write scenarios/scenario.schema.json anew"
+	@echo "make picture    draw docs/images/seed_move.png anew"
+	@echo "make clean      remove $(VENV), caches and logs"
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml requirements-dev.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "hdsim needs Python 3.11 or newer; found: $$($(PYTHON) --version 2>&1). Try: make PYTHON=python3.12"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-dev.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@touch $@
+
+run: $(STAMP)
+	$(BIN)/hdsim run scenarios/seed_move.yaml
+
+check: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test: check
+	$(BIN)/pytest -n $(WORKERS) --durations=10
+
+test-fast: check
+	$(BIN)/pytest -n $(WORKERS) -m "not slow"
+
+lock:
+	uv pip compile --quiet --universal --python-version 3.11 --group dev --all-extras \
+	  --no-header --output-file requirements-dev.lock pyproject.toml
+
+schema: $(STAMP)
+	$(BIN)/hdsim schema -o scenarios/scenario.schema.json
+
+picture: run
+	cp logs/seed_move.png docs/images/seed_move.png
+
+clean:
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist
+	rm -f logs/*.mcap logs/*.png logs/*.partial
+	find hdsim tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
