@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from hdsim.surface.backlash import single_frequency_half_gap, sliding_half_gaps, tooth_half_gaps
+    from hdsim.surface.files import read_heights
     from hdsim.surface.flank import Flank, equivalent_surface, structure_function, structure_function_constant
+    from hdsim.surface.identify import identify
     from hdsim.surface.profile import random_phases, wm_profile
 
 _HOME = {
@@ -18,6 +20,7 @@ _HOME = {
     "structure_function": "flank",
     "structure_function_constant": "flank",
     "random_phases": "profile",
+    "read_heights": "files",
     "wm_profile": "profile",
     "single_frequency_half_gap": "backlash",
     "sliding_half_gaps": "backlash",
@@ -28,6 +31,7 @@ __all__ = [
     "Flank",
     "equivalent_surface",
     "random_phases",
+    "read_heights",
     "single_frequency_half_gap",
     "sliding_half_gaps",
     "structure_function",
