@@ -157,8 +157,10 @@ def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
     parameters = reals[integers[MESH_AT] :]
     free = reals[KAPPA] * angles[2]
     loaded = reals[GAIN] * (angles[0] * reals[INVERSE_RATIO] - reals[OUTPUT_SHARE] * angles[2] + error[0])
-    low = min(free, loaded) - 1e-9
-    high = max(free, loaded) + 1e-9
+    # Wider than from free to loaded: pitch errors push without a twist, the window's slope pulls.
+    margin = 1e-5 + parameters[_mesh.LARGEST_PITCH_ERROR] / parameters[_mesh.LEVER]
+    low = min(free, loaded) - margin
+    high = max(free, loaded) + margin
     angles[1] = free + 0.7 * (loaded - free)
     for _ in range(100):
         call_mesh(integers[MESH_ADDRESS], angles, error, parameters, result)

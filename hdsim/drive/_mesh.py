@@ -93,7 +93,7 @@ def hermite(p, at, step, cells, x):  # type: ignore[no-untyped-def]
 @_inline
 def spring(p, at, step, cells, twist, half_gap):  # type: ignore[no-untyped-def]
     """Energy, torque and stiffness of an odd spring over twist, behind a dead-zone."""
-    if twist > half_gap:
+    if twist >= half_gap:
         return hermite(p, at, step, cells, twist - half_gap)
     if twist < -half_gap:
         energy, force, stiffness = hermite(p, at, step, cells, -twist - half_gap)
@@ -275,7 +275,7 @@ def table_potential(p, x, angle):  # type: ignore[no-untyped-def]
     )
     db = (-0.5 * w1 * w1, -2.0 * w + 1.5 * w * w, 2.0 * w1 - 1.5 * w1 * w1, 0.5 * w * w)
     ddb = (w1, -2.0 + 3.0 * w, -2.0 + 3.0 * w1, w)
-    v = v_x = v_xx = v_a = v_aa = v_xa = v_xaa = 0.0
+    v = v_x = v_xx = v_a = v_aa = v_xa = v_xaa = v_xxa = v_xxaa = 0.0
     for k in range(4):
         line = at + (cell + k) * columns
         s = s_a = s_aa = 0.0
@@ -296,17 +296,22 @@ def table_potential(p, x, angle):  # type: ignore[no-untyped-def]
         v_aa += a[k] * s_aa
         v_xa += da[k] * s_a
         v_xaa += da[k] * s_aa
+        v_xxa += dda[k] * s_a
+        v_xxaa += dda[k] * s_aa
     v_x /= step
     v_xx /= step * step
     v_a /= angle_step
     v_aa /= angle_step * angle_step
     v_xa /= step * angle_step
     v_xaa /= step * angle_step * angle_step
+    v_xxa /= step * step * angle_step
+    v_xxaa /= step * step * angle_step * angle_step
     if beyond != 0.0:
         v += beyond * (v_x + 0.5 * beyond * v_xx)
         v_x += beyond * v_xx
-        v_a += beyond * v_xa
-        v_aa += beyond * v_xaa
+        v_a += beyond * (v_xa + 0.5 * beyond * v_xxa)
+        v_aa += beyond * (v_xaa + 0.5 * beyond * v_xxaa)
+        v_xa += beyond * v_xxa
     return v, v_x, v_xx, v_a, v_aa, v_xa, math.nan
 
 

@@ -126,11 +126,12 @@ class Teeth:
             cells = np.zeros((self.count, 1, 4))
             cells[:, 0, 0] = self.half_gaps_m
         else:
-            from scipy.interpolate import CubicSpline
+            from scipy.interpolate import PchipInterpolator
 
             nodes = np.linspace(-np.pi / 2, np.pi / 2, FLANK_CELLS + 1)
             gaps = mesh.flanks.sliding_half_gaps(self.count, FLANK_CELLS + 1, seed)
-            curve = CubicSpline(nodes, gaps, axis=1)
+            # Monotone pieces: a spline would overshoot to negative gaps.
+            curve = PchipInterpolator(nodes, gaps, axis=1)
             cells = np.moveaxis(curve.c[::-1], (0, 1, 2), (2, 1, 0))
             self.half_gaps_m = gaps.mean(axis=1)
         header[_mesh.GAP_CELLS] = cells.shape[1]
@@ -221,15 +222,22 @@ class Teeth:
         x = np.linspace(-reach, reach, mesh.twist_nodes)
         step = x[1] - x[0]
         angles = np.arange(mesh.angle_nodes) * np.pi / mesh.angle_nodes
-        values = np.array([[_mesh.teeth_potential(exact, xi, a)[0] for a in angles] for xi in x])
-        # Uniform B-spline coefficients: periodic in the angle, natural ends in x with one node more each side.
-        spectrum = np.fft.rfft(values, axis=1)
-        k = np.arange(spectrum.shape[1])
-        columns = np.fft.irfft(
-            spectrum / ((2 + np.cos(2 * np.pi * k / mesh.angle_nodes)) / 3), n=mesh.angle_nodes, axis=1
+        values = np.array([[_mesh.teeth_potential(exact, xi, angle)[0] for angle in angles] for xi in x])
+        ends = np.array(
+            [[_mesh.teeth_potential(exact, xi, angle)[1] for angle in angles] for xi in (x[0], x[-1])]
         )
+        # Uniform B-spline coefficients: periodic in the angle, the exact force at both ends of x.
+        turns = 2 * np.pi * np.arange(mesh.angle_nodes // 2 + 1) / mesh.angle_nodes
+
+        def over_angle(samples: Array) -> Array:
+            spectrum = np.fft.rfft(samples, axis=1) / ((2 + np.cos(turns)) / 3)
+            return np.asarray(np.fft.irfft(spectrum, n=mesh.angle_nodes, axis=1))
+
         knots = np.concatenate([x[0] + step * np.arange(-3, 0), x, x[-1] + step * np.arange(1, 4)])
-        curve = make_interp_spline(x, columns, k=3, t=knots, bc_type="natural")
+        forces = over_angle(ends)
+        curve = make_interp_spline(
+            x, over_angle(values), k=3, t=knots, bc_type=([(1, forces[0])], [(1, forces[1])])
+        )
         coefficients = np.ascontiguousarray(curve.c)
         header[_mesh.TABLE_TWIST_STEP] = step
         header[_mesh.TABLE_TWIST_START] = x[0]

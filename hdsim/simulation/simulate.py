@@ -68,7 +68,9 @@ def simulate_to_log(
     run = build_run(scenario)
     started = time.perf_counter()
     static = run.static()
-    with LogWriter(path, metadata=provenance(scenario), attachments={"scenario.yaml": scenario.to_yaml()}) as log:
+    with LogWriter(
+        path, metadata=provenance(scenario), attachments={"scenario.yaml": scenario.to_yaml()}
+    ) as log:
         if static:
             log.write_static(static)
         told = 0

@@ -65,7 +65,16 @@ class System:
         dy = np.empty(self.size)
         y = np.ascontiguousarray(y)
         self._call(
-            self.kernel.address, t, y, self.integers, self.reals, self._scratch, 0, dy, self._jacobian, self._dfdt
+            self.kernel.address,
+            t,
+            y,
+            self.integers,
+            self.reals,
+            self._scratch,
+            0,
+            dy,
+            self._jacobian,
+            self._dfdt,
         )
         return dy
 

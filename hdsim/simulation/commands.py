@@ -1,0 +1,98 @@
+"""The command ``run``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from hdsim.simulation.run import Run
+
+
+@click.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The log [default: logs/SCENARIO.mcap]."
+)
+@click.option("--plot/--no-plot", default=True, show_default=True, help="Draw the figure beside the log.")
+@click.option("--verify/--no-verify", default=True, show_default=True, help="Check the log after the run.")
+def run(scenario: Path, output: Path | None, plot: bool, verify: bool) -> int:
+    """Simulate SCENARIO, write its log, and draw its figure."""
+    import hdsim
+    from hdsim.errors import InputError
+
+    loaded = hdsim.load_scenario(scenario)
+    path = Path("logs") / f"{scenario.stem}.mcap" if output is None else output
+    if path.suffix != ".mcap":
+        raise InputError(f"--output: found {path}, expected a file name that ends in .mcap")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path.parent}: cannot be made ({error.strerror})") from error
+
+    from hdsim.simulation.simulate import simulate_to_log
+
+    with progress(loaded.run.duration_s, f"{loaded.name}") as on_time:
+        done = simulate_to_log(loaded, path, on_time=on_time)
+    tell(done, loaded.run.duration_s)
+    click.echo(f"log      {path}")
+    if verify:
+        from hdsim.log import verify_log
+
+        report = verify_log(path)
+        click.echo(f"verified {'yes' if report.ok else 'NO: ' + '; '.join(report.problems)}")
+    if plot:
+        picture = path.with_suffix(".png")
+        hdsim.open_log(path).plot().savefig(picture)
+        click.echo(f"picture  {picture}")
+    if done.failure:
+        click.echo(f"error: the run stopped early: {done.failure}", err=True)
+        return 1
+    return 0
+
+
+def tell(run: Run, duration_s: float) -> None:
+    """Print what a run came to."""
+    audit, work = run.audit, run.statistics
+    click.echo(
+        f"simulated {duration_s:g} s in {work.steps} steps ({work.nfev} right-hand sides); energy audit: residual "
+        f"{audit.residual:.2e} J of {audit.exchanged:.3g} J exchanged ({audit.relative:.1e})"
+    )
+
+
+class progress:  # noqa: N801 - used as a function
+    """A progress bar over simulated time on a terminal; nothing elsewhere.
+
+    Args:
+        total: length of the run, s.
+        title: what is running.
+    """
+
+    def __init__(self, total: float, title: str) -> None:
+        self.total, self.title = total, title
+        self._bar: Any = None
+
+    def __enter__(self) -> Any:
+        if not sys.stderr.isatty():
+            return None
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:.3g} of {task.total:.3g} s"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._bar.start()
+        task = self._bar.add_task(self.title, total=self.total)
+        return lambda t: self._bar.update(task, completed=t)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()

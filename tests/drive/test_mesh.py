@@ -1,0 +1,126 @@
+"""The compiled mesh against a plain formula written down again, and its derivatives against differences."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hdsim.contact import dead_zone
+from hdsim.drive import _mesh
+from hdsim.drive.model import Model
+from hdsim.drive.parameters import Drive
+
+
+def teeth_of(mesh: dict[str, Any], **drive: Any) -> Any:
+    model = Model(
+        Drive.model_validate({"preset": "seed-2021", "mesh": mesh} | drive), [], load_inertia_kg_m2=0.5
+    )
+    assert model.teeth is not None
+    return model.teeth
+
+
+def potential(teeth: Any, x: float, angle: float) -> float:
+    """Sum of w U(dead_zone(x + eps, b)) over all teeth, tooth by tooth in Python, from the contact law itself."""
+    engagement = teeth.mesh.engagement
+    depths, weights = np.zeros(teeth.count), np.ones(teeth.count)
+    for j in range(teeth.count):
+        phi = (2 * np.pi * j / teeth.count + angle + np.pi / 2) % np.pi - np.pi / 2
+        gap = teeth.half_gaps_m[j]
+        if engagement.kind == "window":
+            half, edge = engagement.share * np.pi / 2, engagement.edge_teeth * np.pi / teeth.count
+            s = np.clip((half + edge - abs(phi)) / (2 * edge), 0, 1)
+            weights[j] = s**3 * (10 - 15 * s + 6 * s**2)
+        else:
+            gap += teeth.parameters[_mesh.CLEARANCE] * (1 - np.cos(2 * phi)) / 2
+        depths[j] = abs(dead_zone(x + teeth.pitch_errors_m[j], gap))
+    return float(weights @ teeth.law.energy(depths))
+
+
+@pytest.mark.parametrize("kind", ["window", "clearance"])
+def test_potential_is_the_sum_over_the_teeth(kind: str) -> None:
+    teeth = teeth_of({"engagement": {"kind": kind}, "pitch_error_m": 5e-7})
+    for x in (-6e-6, -1e-6, 2e-6, 5e-6, 1e-5):
+        for angle in (0.0, 0.3, 2.9, -17.0):
+            compiled = _mesh.teeth_potential(teeth.parameters, x, angle)[0]
+            assert compiled == pytest.approx(potential(teeth, x, angle), rel=2e-5, abs=1e-12)
+
+
+MESHES = {
+    "window": teeth_of({}),
+    "clearance": teeth_of({"engagement": {"kind": "clearance"}}),
+    "flank": teeth_of({"gap_along_flank": True, "pitch_error_m": 1e-6}),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+@settings(max_examples=60, deadline=None)
+@given(x=st.floats(-2e-5, 2e-5), angle=st.floats(-10, 10))
+def test_derivatives_are_those_of_the_potential(name: str, x: float, angle: float) -> None:
+    parameters = MESHES[name].parameters
+
+    def at(dx: float, da: float) -> Any:
+        return np.array(_mesh.teeth_potential(parameters, x + dx, angle + da))
+
+    hx, ha = 1e-10, 1e-6
+    here = at(0, 0)
+    by_x = (at(hx, 0) - at(-hx, 0)) / (2 * hx)
+    by_a = (at(0, ha) - at(0, -ha)) / (2 * ha)
+    size = max(abs(here[1]), 1.0)
+    assert by_x[0] == pytest.approx(here[1], rel=1e-4, abs=1e-4 * size)
+    assert by_a[0] == pytest.approx(here[3], rel=1e-3, abs=1e-8 * size + 1e-7)
+    # A tooth that touches within the difference's step has a kink there: allow for its stiffness.
+    kink = 1e7
+    assert by_x[1] == pytest.approx(here[2], rel=1e-3, abs=kink)
+    assert by_a[1] == pytest.approx(here[5], rel=1e-2, abs=2e-2 * size + 5.0)
+
+
+def test_tooth_forces_add_up_to_the_mesh_force() -> None:
+    for teeth in MESHES.values():
+        forces, angles = np.zeros(teeth.count), np.zeros(teeth.count)
+        _mesh.tooth_forces(teeth.parameters, 8e-6, 1.234, forces, angles)
+        assert np.sum(forces) == pytest.approx(
+            _mesh.teeth_potential(teeth.parameters, 8e-6, 1.234)[1], rel=1e-12
+        )
+        assert np.all(np.abs(angles) <= np.pi + 1e-12)
+
+
+def test_contact_never_pulls() -> None:
+    for teeth in MESHES.values():
+        forces, angles = np.zeros(teeth.count), np.zeros(teeth.count)
+        for x in (-1e-5, 1e-5):
+            _mesh.tooth_forces(teeth.parameters, x, 0.7, forces, angles)
+            assert np.all(np.sign(forces) * np.sign(x) >= 0)
+
+
+def test_tabulated_mesh_states_an_error_that_holds() -> None:
+    exact = MESHES["window"]
+    table = teeth_of({"model": "tabulated"})
+    assert 0 < table.table_error < 2e-3
+    rng = np.random.default_rng(5)
+    reach = exact.lever_m * exact.loaded(52.0)[0]
+    for x, angle in zip(rng.uniform(-reach, reach, 300), rng.uniform(-5, 5, 300), strict=True):
+        torque = _mesh.table_potential(table.parameters, x, angle)[1] * table.lever_m
+        wanted = _mesh.teeth_potential(exact.parameters, x, angle)[1] * exact.lever_m
+        assert abs(torque - wanted) < 1.5 * table.table_error * 52.0
+
+
+@pytest.mark.parametrize("kind", ["window", "clearance"])
+def test_thirty_percent_of_the_teeth_carry_the_rated_torque(kind: str) -> None:
+    teeth = teeth_of({"engagement": {"kind": kind}})
+    _, share = teeth.loaded(52.0)
+    assert share == pytest.approx(0.30, abs=0.02)
+
+
+def test_clearance_engages_more_teeth_with_more_torque() -> None:
+    teeth = MESHES["clearance"]
+    shares = [teeth.loaded(torque)[1] for torque in (0.5, 5.0, 25.0, 52.0, 150.0)]
+    assert shares == sorted(shares)
+    assert shares[0] < 0.2 < 0.4 < shares[-1] + 0.1
+
+
+def test_compliance_budget_adds_up_to_the_catalogue() -> None:
+    chain = MESHES["window"].chain()
+    assert sum(chain.values()) == pytest.approx(1.0, abs=1e-12)
+    assert all(share >= 0 for share in chain.values())
