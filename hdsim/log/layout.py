@@ -20,7 +20,7 @@ from hdsim.errors import InputError
 STATE = "/hd/state_view"
 TEETH = "/hd/teeth"
 LOOP = "/hd/state_loop"
-STATIC = "/hd/static"
+STATIC = "/hd/static_view"
 EVENTS = "/hd/events"
 SCENE = "/hd/scene"
 SCENE_STATIC = "/hd/scene_static"
@@ -94,7 +94,7 @@ def plot(title: str, *paths: str, over: str | None = None, dots: bool = False) -
     settings: dict[str, Any] = {
         "paths": lines,
         "showLegend": True,
-        "legendDisplay": "floating",
+        "legendDisplay": "top" if len(paths) > 1 else "none",
         "showPlotValuesInLegend": False,
         "showXAxisLabels": True,
         "showYAxisLabels": True,
@@ -188,7 +188,9 @@ def _profile() -> Panel:
 
 
 def _loop() -> Panel:
-    return plot("Torque [N m] over twist [rad]", f"{LOOP}.output_torque[:]", over=f"{LOOP}.twist[:]")
+    return plot(
+        "Torque [N m] over twist [arcsec]", f"{LOOP}.output_torque[:]", over=f"{LOOP}.twist_arcsec[:]"
+    )
 
 
 def _contact_lamp() -> Panel:
@@ -197,7 +199,7 @@ def _contact_lamp() -> Panel:
 
 def overview() -> Split:
     """The drive turning, where it should be, how far off it is, and what loads it."""
-    errors = plot("Error [rad]", f"{STATE}.tracking_error", f"{STATE}.transmission_error")
+    errors = plot("Error [arcsec]", f"{STATE}.tracking_error_arcsec", f"{STATE}.transmission_error_arcsec")
     small = row((50, gauge("Engaged share", f"{STATE}.engaged_share", 0, 1)), (50, _contact_lamp()))
     return row(
         (40, column((60, scene()), (15, small), (25, events()))),
@@ -219,12 +221,12 @@ def positioning_error() -> Split:
         (
             35,
             column(
-                (34, plot("Transmission error [rad]", f"{STATE}.transmission_error")),
-                (33, plot("Tracking error [rad]", f"{STATE}.tracking_error")),
-                (33, plot("Kinematic error [rad]", f"{STATE}.kinematic_error")),
+                (34, plot("Transmission error [arcsec]", f"{STATE}.transmission_error_arcsec")),
+                (33, plot("Tracking error [arcsec]", f"{STATE}.tracking_error_arcsec")),
+                (33, plot("Kinematic error [arcsec]", f"{STATE}.kinematic_error_arcsec")),
             ),
         ),
-        (35, column((34, plot("Twist [rad]", f"{STATE}.twist")), (33, _torques()), (33, _loop()))),
+        (35, column((34, plot("Twist [arcsec]", f"{STATE}.twist_arcsec")), (33, _torques()), (33, _loop()))),
         (30, column((55, scene()), (25, _motion()), (20, events()))),
     )
 
@@ -242,7 +244,10 @@ def tooth_contact() -> Split:
                 (
                     25,
                     plot(
-                        "Half-gap of each tooth [m]", f"{STATIC}.tooth_half_gap[:]", over="index", dots=True
+                        "Half-gap of each tooth [um]",
+                        f"{STATIC}.tooth_half_gap_um[:]",
+                        over="index",
+                        dots=True,
                     ),
                 ),
                 (20, row((60, _loop()), (40, _contact_lamp()))),
@@ -261,7 +266,7 @@ def diagnose() -> Split:
         (
             50,
             column(
-                (34, three("Transmission error [rad]", "transmission_error")),
+                (34, three("Transmission error [arcsec]", "transmission_error_arcsec")),
                 (33, three("Output torque [N m]", "output_torque")),
                 (33, three("Motor torque [N m]", "motor_torque")),
             ),

@@ -41,7 +41,7 @@ RECOVERED_RECORD = "hdsim.recovered"
 TABLE_RECORD = "hdsim.table."
 
 RESERVED_TABLES = frozenset(
-    {"static", "events", "scene", "scene_static", "transforms"}
+    {"static", "static_view", "events", "scene", "scene_static", "transforms"}
     | {table + suffix for table in VIEWED_TABLES for suffix in (VIEW_SUFFIX, LOOP_SUFFIX)}
 )
 

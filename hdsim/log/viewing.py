@@ -11,7 +11,8 @@ from hdsim.log.naming import Array, ColumnSpec
 from hdsim.log.streams import TableStream
 from hdsim.log.view import MinMaxView
 
-LOOP_COLUMNS = ("twist", "output_torque")
+ARCSEC_PER_RAD = 180 * 3600 / np.pi
+LOOP_COLUMNS = ("twist_arcsec", "output_torque")
 LOOP_SAMPLES = 1000
 """Samples of the view that a loop shows: the last ones before its time."""
 
@@ -19,17 +20,48 @@ LOOP_EVERY = 100
 """Samples of the view from one loop to the next."""
 
 
+def display_columns(columns: Sequence[ColumnSpec]) -> list[tuple[int, float, ColumnSpec]]:
+    """Columns that a view holds once more in a unit in which their numbers are not tiny.
+
+    Viewers label and scale axes in steps of 0.001 at the finest, which an angle error in rad never fills.
+
+    Returns:
+        For each: its position among ``columns``, the factor, and the column in the new unit.
+    """
+    found = []
+    for index, column in enumerate(columns):
+        if column.unit == "rad" and column.name.endswith(("error", "twist")):
+            unit, factor = "arcsec", ARCSEC_PER_RAD
+        elif column.unit == "m":
+            unit, factor = "um", 1e6
+        else:
+            continue
+        name = f"{column.name}_{unit}"
+        if not any(c.field == f"{column.field}_{unit}" for c in columns):
+            about = ColumnSpec(name, f"{column.field}_{unit}", unit, column.description, column.shape)
+            found.append((index, factor, about))
+    return found
+
+
 class ViewStream:
     """The decimated twin of a table.
 
     Args:
         view: what thins the rows.
-        stream: where they go.
+        stream: where they go: the table's columns, and `display_columns` of them.
+        extra: position and factor of those.
         loop: the loop topic that is fed with them, if any.
     """
 
-    def __init__(self, view: MinMaxView, stream: TableStream, loop: LoopStream | None) -> None:
+    def __init__(
+        self,
+        view: MinMaxView,
+        stream: TableStream,
+        extra: Sequence[tuple[int, float]],
+        loop: LoopStream | None,
+    ) -> None:
         self._view = view
+        self._extra = extra
         self._stream = stream
         self._loop = loop
 
@@ -53,6 +85,7 @@ class ViewStream:
             self._loop.stream.flush()
 
     def _write(self, time: Array, columns: Sequence[Array]) -> None:
+        columns = [*columns, *(columns[index] * factor for index, factor in self._extra)]
         begin = 0
         while begin < len(time):
             rows = slice(begin, begin + self._stream.room)

@@ -15,7 +15,7 @@ from hdsim.log import naming
 from hdsim.log.container import Container
 from hdsim.log.streams import MessageStream, TableStream
 from hdsim.log.view import MinMaxView
-from hdsim.log.viewing import LoopStream, ViewStream
+from hdsim.log.viewing import LoopStream, ViewStream, display_columns
 from hdsim.recording import Event, Table
 
 if TYPE_CHECKING:
@@ -135,6 +135,19 @@ class LogWriter:
         stream = self._add_table("static", naming.STATIC_TOPIC, flat, specs, time=False)
         stream.append(None, np.array([naming.EPOCH_NS]), row)
         stream.flush()
+        extra = display_columns(flat)
+        if extra:
+            topic = naming.STATIC_TOPIC + naming.VIEW_SUFFIX
+            shown = self._stream(
+                topic,
+                "hdsim.StaticView",
+                [c for _, _, c in extra],
+                {"view_of": naming.STATIC_TOPIC},
+                time=False,
+            )
+            scaled = [row[index] * factor for index, factor, _ in extra]
+            shown.append(None, np.array([naming.EPOCH_NS]), scaled)
+            shown.flush()
 
     def write(self, name: str, block: Table) -> None:
         """Write the next rows of a table.
@@ -275,21 +288,35 @@ class LogWriter:
         def make(
             topic: str, kind: str, fields: Sequence[naming.ColumnSpec], about: dict[str, str]
         ) -> TableStream:
-            schema_id = self._schemas.setdefault(kind, len(self._schemas) + 1)
-            self._topics[topic] = [*(["time"] if time else []), *(f.field for f in fields)]
-            return TableStream(
-                self._container, self._next_channel(), topic, schema_id, kind, fields, about, time=time
-            )
+            return self._stream(topic, kind, fields, about, time=time)
 
         message_type = naming.message_type_of(name)
         self._tables[name] = stream = make(topic, message_type, layout, {"columns": text})
         if name in naming.VIEWED_TABLES:
             about = {"view_of": topic}
             loop_type = naming.message_type_of("loop")
-            loop = LoopStream.of(layout, lambda f: make(topic + naming.LOOP_SUFFIX, loop_type, f, about))
-            twin = make(topic + naming.VIEW_SUFFIX, message_type, layout, about)
-            self._views[name] = ViewStream(MinMaxView(self._view_rate), twin, loop)
+            extra = display_columns(layout)
+            shown = [*layout, *(column for _, _, column in extra)]
+            loop = LoopStream.of(shown, lambda f: make(topic + naming.LOOP_SUFFIX, loop_type, f, about))
+            twin = make(topic + naming.VIEW_SUFFIX, naming.message_type_of(name + "_view"), shown, about)
+            factors = [(index, factor) for index, factor, _ in extra]
+            self._views[name] = ViewStream(MinMaxView(self._view_rate), twin, factors, loop)
         return stream
+
+    def _stream(
+        self,
+        topic: str,
+        message_type: str,
+        fields: Sequence[naming.ColumnSpec],
+        about: dict[str, str],
+        *,
+        time: bool,
+    ) -> TableStream:
+        schema_id = self._schemas.setdefault(message_type, len(self._schemas) + 1)
+        self._topics[topic] = [*(["time"] if time else []), *(f.field for f in fields)]
+        return TableStream(
+            self._container, self._next_channel(), topic, schema_id, message_type, fields, about, time=time
+        )
 
     def _attach_layouts(self) -> None:
         """Layouts come last: what they can show is known only then, and `hdsim layout` makes them again."""

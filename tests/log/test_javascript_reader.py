@@ -72,7 +72,13 @@ def test_javascript_reads_every_message_to_the_bit(reader, recording, tmp_path):
     assert sum(counts.values()) == found["messages"]
     views = counts.pop("/hd/state_view")
     assert 19_000 < views <= 20_002
-    assert counts == {"/hd/state": 30_000, "/hd/teeth": 300, "/hd/static": 1, "/hd/events": 3}
+    assert counts == {
+        "/hd/state": 30_000,
+        "/hd/teeth": 300,
+        "/hd/static": 1,
+        "/hd/static_view": 1,
+        "/hd/events": 3,
+    }
     assert found["attachments"]["scenario.yaml"] == recording.metadata["scenario"]
     assert found["metadata"][0] == "hdsim.run"
     state, teeth = found["topics"]["/hd/state"], found["topics"]["/hd/teeth"]

@@ -49,7 +49,7 @@ def test_every_path_of_a_shipped_layout_exists_in_the_log_with_its_type(diagnose
     paths = list(message_paths(built))
     assert len(paths) > 3
     shapes = {c.field: c.repeated for specs in info_log(diagnosed).tables.values() for c in specs}
-    shapes |= {"output_torque": False, "twist": False}
+    shapes |= {f"{name}_arcsec": False for name in shapes} | {"tooth_half_gap_um": True}
     for path in paths:
         topic, field = layout.split_path(path)
         assert topic in fields, path
@@ -101,7 +101,7 @@ def test_what_a_log_lacks_is_left_out(tmp_path):
     assert "3D!drive" not in built["configById"]
     assert "Indicator!contact" not in built["configById"]
     (error,) = (s for p, s in built["configById"].items() if p == "Plot!error")
-    assert [line["label"] for line in error["paths"]] == ["transmission_error"]
+    assert [line["label"] for line in error["paths"]] == ["transmission_error_arcsec"]
 
 
 @pytest.mark.parametrize(
@@ -148,8 +148,9 @@ def test_loops_hold_the_last_samples_before_their_time(diagnosed):
     for loop in (loops[0], loops[5], loops[-1]):
         end = int(np.searchsorted(run.time, loop.time)) + 1
         begin = max(0, end - 1000)
-        np.testing.assert_array_equal(loop.twist[1000 - (end - begin) :], run["twist"][begin:end])
+        twist = run["twist"][begin:end] * (180 * 3600 / np.pi)
+        np.testing.assert_array_equal(loop.twist_arcsec[1000 - (end - begin) :], twist)
         np.testing.assert_array_equal(
             loop.output_torque[1000 - (end - begin) :], run["output_torque"][begin:end]
         )
-        assert np.isnan(loop.twist[: 1000 - (end - begin)]).all()
+        assert np.isnan(loop.twist_arcsec[: 1000 - (end - begin)]).all()

@@ -85,3 +85,25 @@ def test_the_view_of_a_run_holds_at_most_20000_samples_and_its_peak(tmp_path, n,
     assert least <= len(messages) <= most
     assert max(m.angle for m in messages) == 1e6
     assert min(m.angle for m in messages) == angle.min()
+
+
+def test_views_hold_small_angles_and_lengths_in_units_that_fill_an_axis(tmp_path):
+    state = Table(
+        np.arange(3.0),
+        {
+            "transmission_error": Column(np.array([1e-5, 2e-5, -1e-5]), "rad"),
+            "motor_angle": Column(np.zeros(3), "rad"),
+            "twist": Column(np.full(3, np.pi / 180 / 3600), "rad"),
+        },
+    )
+    recording = Recording({"state": state}, static={"gap": Column(np.array([1e-6, 2e-6]), "m")})
+    path = write_log(recording, tmp_path / "a.mcap")
+    messages = read_topic(path, "/hd/state_view")
+    np.testing.assert_allclose(
+        [m.transmission_error_arcsec for m in messages], [2.062648, 4.125296, -2.062648], 1e-6
+    )
+    np.testing.assert_allclose([m.twist_arcsec for m in messages], 1.0)
+    assert messages[1].transmission_error == 2e-5
+    assert not hasattr(messages[0], "motor_angle_arcsec")
+    (static,) = read_topic(path, "/hd/static_view")
+    np.testing.assert_allclose(static.gap_um, [1.0, 2.0])
