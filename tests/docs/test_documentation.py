@@ -1,0 +1,139 @@
+"""The documentation is linked, its examples work and its lists are complete."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+import hdsim
+from hdsim.cli import COMMANDS
+from hdsim.scenario import Scenario, json_schema
+
+ROOT = Path(__file__).parents[2]
+README = ROOT / "README.md"
+DOCS = ROOT / "docs"
+PAGES = [README, *sorted(DOCS.glob("**/*.md"))]
+SECTIONS = {"extends", *Scenario.model_fields}
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def links(page: Path) -> set[str]:
+    return set(re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")))
+
+
+def scenario_examples() -> list[Any]:
+    found = []
+    for page in PAGES:
+        for k, text in enumerate(blocks(page, "yaml")):
+            if set(YAML(typ="safe").load(text)) <= SECTIONS:
+                found.append(pytest.param(text, id=f"{page.stem}-{k}"))
+    return found
+
+
+def test_every_page_is_in_the_index() -> None:
+    linked = {(DOCS / link).resolve() for link in links(DOCS / "README.md")}
+    assert [
+        page.name for page in DOCS.glob("**/*.md") if page.name != "README.md" and page not in linked
+    ] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_somewhere(page: Path) -> None:
+    for link in links(page):
+        if link.startswith(("http://", "https://")):
+            continue
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name).resolve() if name else page
+        assert target.exists(), link
+        if anchor:
+            titles = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            anchors = {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+            assert anchor in anchors, link
+
+
+@pytest.mark.parametrize("text", scenario_examples())
+def test_scenarios_in_the_documentation_are_valid(text: str, tmp_path: Path) -> None:
+    data = YAML(typ="safe").load(text)
+    base = (ROOT / "scenarios" / "seed_move.yaml").read_text(encoding="utf-8")
+    (tmp_path / "base.yaml").write_text(base, encoding="utf-8")
+    if "extends" not in data and not {"drive", "command", "load", "run"} <= set(data):
+        text = f"extends: base.yaml\n{text}"  # an excerpt
+    path = tmp_path / "example.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert hdsim.load_scenario(path).drive.rated_torque_nm > 0
+
+
+def test_the_readme_has_a_whole_scenario() -> None:
+    assert any(
+        {"drive", "command", "load", "run"} <= set(YAML(typ="safe").load(t)) for t in blocks(README, "yaml")
+    )
+
+
+def test_the_schema_beside_the_scenarios_is_current() -> None:
+    path = ROOT / "scenarios" / "scenario.schema.json"
+    stored = json.loads(path.read_text(encoding="utf-8"))
+    assert stored == json.loads(json.dumps(json_schema(Scenario))), "run: make schema"
+
+
+def test_the_readme_lists_every_command() -> None:
+    text = README.read_text(encoding="utf-8")
+    assert [name for name in COMMANDS if f"`hdsim {name}" not in text] == []
+
+
+def test_the_readme_gives_a_reason_for_every_dependency_and_top_level_entry() -> None:
+    text = README.read_text(encoding="utf-8")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    named = [*project["project"]["dependencies"]]
+    for extra in project["project"]["optional-dependencies"].values():
+        named += extra
+    for group in project["dependency-groups"].values():
+        named += group
+    names = [re.split(r"[\[<>=~;! ]", requirement)[0] for requirement in named]
+    assert [name for name in names if f"`{name}`" not in text] == []
+    listed = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
+    ).stdout.split("\n")
+    entries = {line.split("/")[0] + ("/" if "/" in line else "") for line in listed if line}
+    assert [entry for entry in sorted(entries) if f"`{entry}`" not in text] == []
+
+
+def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    (tmp_path / "logs").mkdir()
+    (example,) = blocks(README, "python")
+    exec(compile(example, "README.md", "exec"), {})
+    assert list(tmp_path.glob("logs/*.mcap"))
+    assert list(tmp_path.glob("logs/*.png"))
+
+
+def test_the_effect_that_the_documentation_adds_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, test = blocks(DOCS / "extending.md", "python")
+    name = "hdsim.effects.eddy_current_brake"
+    path = tmp_path / "eddy_current_brake.py"
+    path.write_text(code, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, name, module)
+    spec.loader.exec_module(module)
+    space: dict[str, Any] = {}
+    exec(compile(test, "extending.md", "exec"), space)
+    tests = [function for title, function in space.items() if title.startswith("test_")]
+    assert len(tests) == 1
+    tests[0]()
