@@ -469,7 +469,6 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
     on the output, which friction depends on, is found by Newton's method.
     """
     read_coordinates(t, y, integers, reals, scratch)
-    angles = scratch[S_ANGLES : S_ANGLES + 3]
     velocities = scratch[S_VELOCITIES : S_VELOCITIES + 3]
     accelerations = scratch[S_ACCELERATIONS : S_ACCELERATIONS + 3]
     c, bend = rigid_output(integers, reals, scratch)
@@ -542,7 +541,7 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
         row[MOTOR_ANGLE + 1] += c * row[OUTPUT_ANGLE + 1]
     # The transmitted torque's column through its own equation.
     for k in range(columns):
-        if k == TRANSMITTED_TORQUE or k == OUTPUT_ANGLE or k == OUTPUT_ANGLE + 1:
+        if k in (TRANSMITTED_TORQUE, OUTPUT_ANGLE, OUTPUT_ANGLE + 1):
             continue
         d_alpha = 0.0
         if free:

@@ -59,6 +59,7 @@ TABLE_TWIST_NODES = 22
 TABLE_ANGLE_NODES = 23
 TABLE_AT = 24
 TABLE_TWIST_START = 25
+SMOOTHING = 26  # half-width of the dead-zone's rounded corners, m
 HEADER = 28
 
 _jit: Any = njit(cache=True, nogil=True, error_model="numpy")
@@ -119,11 +120,30 @@ def window(angle, plateau, border):  # type: ignore[no-untyped-def]
 
 
 @_inline
+def ramp(u, width):  # type: ignore[no-untyped-def]
+    """Ramp rounded over +- width, its slope and curvature; see ``hdsim.contact.smooth_dead_zone``."""
+    if u >= width:
+        return u, 1.0, 0.0
+    if u <= -width:
+        return 0.0, 0.0, 0.0
+    t = (u + width) / (2.0 * width)
+    return 2.0 * width * t * t * t * (1.0 - 0.5 * t), t * t * (3.0 - 2.0 * t), 3.0 * t * (1.0 - t) / width
+
+
+@_inline
+def smooth_depth(x, gap, width):  # type: ignore[no-untyped-def]
+    """Smooth dead-zone at x >= 0 and its derivatives: f, f_x, f_gap, f_xx (= f_gap,gap), f_x,gap."""
+    here, here_1, here_2 = ramp(x - gap, width)
+    there, there_1, there_2 = ramp(-x - gap, width)
+    return here - there, here_1 + there_1, there_1 - here_1, here_2 - there_2, -here_2 - there_2
+
+
+@_inline
 def contact_border(p, x):  # type: ignore[no-untyped-def]
     """Angle from the major axis beyond which no tooth can touch at displacement x."""
     if p[KIND] == 0.0:
         return p[BORDER]
-    reach = (abs(x) + p[LARGEST_PITCH_ERROR]) / p[CLEARANCE]
+    reach = (abs(x) + p[LARGEST_PITCH_ERROR] + p[SMOOTHING]) / p[CLEARANCE]
     if reach >= 1.0:
         return 0.5 * math.pi
     return math.asin(math.sqrt(reach))
@@ -146,14 +166,15 @@ def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
     contact_at = int(p[CONTACT_AT])
     contact_step = p[CONTACT_STEP]
     contact_cells = p[CONTACT_CELLS]
+    smoothing = p[SMOOTHING]
     v = v_x = v_xx = v_a = v_aa = v_xa = 0.0
     engaged = 0
     turn_cos = math.cos(2.0 * pitch)
     turn_sin = math.sin(2.0 * pitch)
     for lobe in range(2):
         origin = angle - lobe * math.pi
-        first = int(math.ceil((-border - origin) / pitch))
-        last = int(math.floor((border - origin) / pitch))
+        first = math.ceil((-border - origin) / pitch)
+        last = math.floor((border - origin) / pitch)
         phi = first * pitch + origin
         c2 = math.cos(2.0 * phi)
         s2 = math.sin(2.0 * phi)
@@ -184,28 +205,35 @@ def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
             if tooth == teeth:
                 tooth = 0
             depth = abs(shifted) - gap
-            if depth <= 0.0:
+            if depth <= -smoothing:
                 continue
             side = 1.0 if shifted > 0.0 else -1.0
+            by_x, by_gap, by_x2, by_x_gap = 1.0, -1.0, 0.0, 0.0
+            if smoothing > 0.0:
+                depth, by_x, by_gap, by_x2, by_x_gap = smooth_depth(abs(shifted), gap, smoothing)
             energy, force, stiffness = hermite(p, contact_at, contact_step, contact_cells, depth)
-            if weight >= 0.5:
+            if weight >= 0.5 and depth > 0.0:
                 engaged += 1
             v += weight * energy
-            v_x += weight * force * side
-            v_xx += weight * stiffness
-            v_a += slope * energy - weight * force * gap_a
+            # by_x2 is the second derivative over the gap, too.
+            v_x += weight * force * by_x * side
+            v_xx += weight * (stiffness * by_x * by_x + force * by_x2)
+            v_a += slope * energy + weight * force * by_gap * gap_a
             v_aa += (
                 curvature * energy
-                - 2.0 * slope * force * gap_a
-                + weight * (stiffness * gap_a * gap_a - force * gap_aa)
+                + 2.0 * slope * force * by_gap * gap_a
+                + weight
+                * ((stiffness * by_gap * by_gap + force * by_x2) * gap_a * gap_a + force * by_gap * gap_aa)
             )
-            v_xa += side * (slope * force - weight * stiffness * gap_a)
+            v_xa += side * (
+                slope * force * by_x + weight * (stiffness * by_x * by_gap + force * by_x_gap) * gap_a
+            )
     return v, v_x, v_xx, v_a, v_aa, v_xa, float(engaged)
 
 
 @_jit
 def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
-    """Normal force (N, signed by flank) and angle from the major axis (rad, within a half turn) of every tooth."""
+    """Every tooth's normal force (N, signed by flank) and angle from the major axis (rad, within a half turn)."""
     teeth = int(p[TEETH])
     pitch = 2.0 * math.pi / teeth
     cells = int(p[GAP_CELLS])
@@ -225,17 +253,19 @@ def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
         at = int(p[GAP_AT]) + 4 * (tooth * cells + cell)
         gap += p[at] + s * (p[at + 1] + s * (p[at + 2] + s * p[at + 3]))
         shifted = x + p[int(p[PITCH_ERROR_AT]) + tooth]
-        depth = abs(shifted) - gap
+        depth, by_x = abs(shifted) - gap, 1.0
+        if p[SMOOTHING] > 0.0:
+            depth, by_x, _, _, _ = smooth_depth(abs(shifted), gap, p[SMOOTHING])
         forces[tooth] = 0.0
         if depth > 0.0:
             side = 1.0 if shifted > 0.0 else -1.0
-            force = hermite(p, int(p[CONTACT_AT]), p[CONTACT_STEP], p[CONTACT_CELLS], depth)[1]
+            force = by_x * hermite(p, int(p[CONTACT_AT]), p[CONTACT_STEP], p[CONTACT_CELLS], depth)[1]
             forces[tooth] = weight * force * side
 
 
 @_jit
 def table_potential(p, x, angle):  # type: ignore[no-untyped-def]
-    """``teeth_potential`` from a bicubic spline of V over displacement and angle (period pi); extended linearly."""
+    """``teeth_potential`` from a bicubic spline of V over displacement and angle (period pi), linear beyond."""
     step = p[TABLE_TWIST_STEP]
     rows = int(p[TABLE_TWIST_NODES])
     columns = int(p[TABLE_ANGLE_NODES])

@@ -196,7 +196,7 @@ class Model:
 
     @property
     def inertias(self) -> tuple[float, float, float]:
-        """Inertia of motor, ring and output, kg m^2; a ring without its own coordinate moves with the output."""
+        """Inertia of motor, ring and output, kg m^2; a ring that is no coordinate moves with the output."""
         inertia = self.drive.inertia
         output = self.load_inertia_kg_m2
         if not self.has_ring and self.drive.arrangement == "circular_spline_fixed":

@@ -36,7 +36,7 @@ class Geometry(Parameters):
 
 
 class Torsion(Parameters):
-    """Torsional stiffness of the whole drive at the output, input locked, in the catalogue's three segments."""
+    """Torsional stiffness of the whole drive at the output, input locked, in three segments."""
 
     stiffness_k1_nm_per_rad: float = Field(gt=0)
     """Secant stiffness from 0 to the first torque, N m/rad."""
@@ -128,6 +128,8 @@ class ToothedMesh(Parameters):
     """The same half-gap for every tooth, m; given instead of the Weierstrass-Mandelbrot backlash."""
     gap_along_flank: bool = False
     """Let the gap follow the flank's profile as the contact point slides, instead of each tooth's average."""
+    gap_smoothing_m: float = Field(0.0, ge=0, le=1e-5)
+    """Half-width over which the dead-zone's corners are rounded, m (0: Eq. 14 as printed)."""
     damping_nm_s_per_rad: float = Field(0.0, ge=0)
     """Viscous damping parallel to the mesh, as a torsional damping at the output, N m s/rad."""
     ring: Literal["dynamic", "static"] = "dynamic"

@@ -1,4 +1,4 @@
-"""The torsion chain: the catalogue's wind-up, the share that the mesh already has, and the rest as a table."""
+"""The torsion chain: the catalogue's wind-up, the share that the mesh already has, the rest as a table."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def structure_wind_up(
     def wind_up(torque: Array) -> Array:
         size = np.abs(torque)
         twist = np.interp(size, corners, inner) + np.maximum(size - corners[-1], 0.0) * compliance[-1]
-        return np.sign(torque) * twist
+        return np.asarray(np.sign(torque) * twist)
 
     return wind_up
 

@@ -3,24 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hdsim.contact.parameters import ContactParameters, TableLawParameters
 from hdsim.drive import _mesh, spring
 from hdsim.drive.parameters import ClearanceEngagement, Drive, TabulatedMesh, ToothedMesh, WindowEngagement
 from hdsim.errors import PhysicsError
 
 if TYPE_CHECKING:
+    from hdsim.contact.kernel_table import ContactTable
     from hdsim.contact.law import ContactLaw
+    from hdsim.surface.flank import Flank
 
 Array = NDArray[np.float64]
 
 #: Nodes of the gap along a tooth's flank, over half a turn of the wave generator.
 FLANK_CELLS = 64
-#: Angles of the wave generator over which an average over the teeth is taken, within one tooth pitch and beyond.
+#: Angles of the wave generator over which an average is taken, within one tooth pitch and beyond.
 PROBES = 24
+
+
+def _series_law(contact: ContactParameters, surface: Flank, bending: float | None) -> ContactLaw:
+    from hdsim.contact import SeriesLaw
+
+    law = contact.build(surface)
+    return law if bending is None else SeriesLaw(law, bending)
+
+
+# A contact depends on D, G and material, not on the random phases: drives of one design share it.
+_kept_law = lru_cache(maxsize=32)(_series_law)
+
+
+@lru_cache(maxsize=32)
+def _kept_table(law: ContactLaw, largest_force_n: float) -> ContactTable:
+    """Table of a law; laws are compared by identity, so this is for those that ``_kept_law`` shares."""
+    from hdsim.contact import tabulate
+
+    return tabulate(law, largest_force_n, measure_error=False)
 
 
 class Teeth:
@@ -72,6 +95,7 @@ class Teeth:
         header[_mesh.KAPPA] = 1.0 if fixed else 0.0
         header[_mesh.INVERSE_RATIO] = 1 / drive.ratio
         header[_mesh.LEVER] = self.lever_m
+        header[_mesh.SMOOTHING] = mesh.gap_smoothing_m
         header[_mesh.LARGEST_PITCH_ERROR] = float(np.max(np.abs(self.pitch_errors_m)))
         self._blocks: list[Array] = [header]
         self._length = _mesh.HEADER
@@ -95,20 +119,18 @@ class Teeth:
 
     def _law(self) -> ContactLaw:
         """Contact in series with the bending of the tooth."""
-        from hdsim.contact import SeriesLaw
-
-        law = self.mesh.contact.build(self.mesh.flanks.equivalent())
-        bending = self.mesh.tooth_bending_stiffness_n_per_m
-        return law if bending is None else SeriesLaw(law, bending)
+        mesh = self.mesh
+        if isinstance(mesh.contact, TableLawParameters):
+            # Its file may change between two drives of one process.
+            return _series_law(mesh.contact, mesh.flanks.equivalent(), mesh.tooth_bending_stiffness_n_per_m)
+        return _kept_law(mesh.contact, mesh.flanks.equivalent(), mesh.tooth_bending_stiffness_n_per_m)
 
     def _pitch_errors(self, seed: int) -> Array:
         errors = np.random.default_rng([seed, 2]).normal(0.0, 1.0, self.count) * self.mesh.pitch_error_m
-        return errors - errors.mean()
+        return np.asarray(errors - errors.mean())
 
     def _place_contact(self) -> None:
-        from hdsim.contact import tabulate
-
-        table = tabulate(self.law, 20 * self.rated_tooth_force_n)
+        table = _kept_table(self.law, 20 * self.rated_tooth_force_n)
         header = self._header
         header[_mesh.CONTACT_STEP] = table.step_m
         header[_mesh.CONTACT_CELLS] = table.count
@@ -130,6 +152,8 @@ class Teeth:
 
             nodes = np.linspace(-np.pi / 2, np.pi / 2, FLANK_CELLS + 1)
             gaps = mesh.flanks.sliding_half_gaps(self.count, FLANK_CELLS + 1, seed)
+            # Half a turn on, the tooth meets the other lobe at the same place of its flank.
+            gaps[:, 0] = gaps[:, -1] = 0.5 * (gaps[:, 0] + gaps[:, -1])
             # Monotone pieces: a spline would overshoot to negative gaps.
             curve = PchipInterpolator(nodes, gaps, axis=1)
             cells = np.moveaxis(curve.c[::-1], (0, 1, 2), (2, 1, 0))
@@ -145,8 +169,8 @@ class Teeth:
             edge = engagement.edge_teeth * np.pi / self.count
             if edge > half or half + edge > np.pi / 2:
                 raise PhysicsError(
-                    f"edge_teeth = {engagement.edge_teeth:g} does not fit an arc of {half * self.count / np.pi:.1f} "
-                    f"teeth within half a turn"
+                    f"edge_teeth = {engagement.edge_teeth:g} does not fit an arc of "
+                    f"{half * self.count / np.pi:.1f} teeth within half a turn"
                 )
             header[_mesh.PLATEAU], header[_mesh.BORDER] = half - edge, half + edge
             return
@@ -173,7 +197,7 @@ class Teeth:
         return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
 
     def torque(self, twist: float) -> tuple[float, float]:
-        """Mean mesh torque at the ring (N m) and engaged share over the wave generator's angle, at a twist (rad)."""
+        """Mean mesh torque at the ring (N m) and engaged share over the wave generator's angle, twist in rad."""
         parameters = np.concatenate(self._blocks)
         angles = np.arange(PROBES) * np.pi / PROBES * (1 + 1 / self.count)
         samples = np.array(
@@ -254,7 +278,7 @@ class Teeth:
         self.table_error = float(max(errors)) * self.lever_m * self.scale / self.drive.rated_torque_nm
 
     def chain(self) -> dict[str, float]:
-        """Compliance budget at rated torque: share of the wind-up of contact and gap, bending and structure."""
+        """Compliance budget at rated torque: share of the wind-up in contact and gap, bending, structure."""
         rated = self.drive.rated_torque_nm
         total = float(spring.catalogue_wind_up(self.drive.torsion, np.array(rated)))
         mesh = self.loaded(rated / self.scale)[0] / self.scale

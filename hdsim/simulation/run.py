@@ -154,7 +154,7 @@ class Run:
         keep = np.concatenate([[True], np.diff(times) > 1e-12 * max(1.0, self.duration_s)])
         times = times[keep]
         times[-1] = self.duration_s
-        return times
+        return np.asarray(times)
 
     def blocks(self, on_time: Callable[[float], object] | None = None) -> Iterator[dict[str, Table]]:
         """Integrate; yields tables by name as soon as a block of samples is complete.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hdsim.drive.model import Model
 from hdsim.simulation.run import Run, SampledLoop
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 def build_model(scenario: Scenario) -> Model:
     """The scenario's drive with its effects, load and commands, as an ODE."""
     drive = scenario.drive
-    motions = {motion.axis: motion.signal for motion in scenario.command.motions(drive.ratio)}
+    motions: dict[str, object] = {m.axis: m.signal for m in scenario.command.motions(drive.ratio)}
     return Model(
         drive,
         [*scenario.effects.active().values(), scenario.load, scenario.command],
         load_inertia_kg_m2=scenario.load.inertia_kg_m2,
-        motions=dict(motions),
+        motions=motions,
         seed=scenario.run.seed,
     )
 

@@ -1,4 +1,4 @@
-"""The catalogue's lines for a drive, measured on its simulation as a test bench measures them on the drive."""
+"""The catalogue's lines for a drive, measured on its simulation as a test bench does on the drive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from hdsim.drive.parameters import Drive
-from hdsim.drive.presets import CatalogueFigures, catalogue_figures
+from hdsim.drive.presets import catalogue_figures
+from hdsim.drive.catalogue import CatalogueFigures
 from hdsim.errors import InputError
 from hdsim.recording import Recording
 from hdsim.scenario.model import Scenario
@@ -84,7 +85,7 @@ def bench(
 
 
 def torsion_cycle(preset: str, *, mesh: dict[str, Any] | None = None, period_s: float = 8.0) -> Recording:
-    """Motor locked, the output loaded slowly to plus and minus rated torque and back: one and a quarter cycles."""
+    """Motor locked, the output loaded slowly to plus and minus rated torque: one and a quarter cycles."""
     figures = catalogue_figures(preset)
     return simulate(
         bench(
@@ -154,7 +155,7 @@ def back_driving_torque(preset: str) -> float:
 
 
 def steady_run(preset: str, rpm: float, load_torque_nm: float) -> Recording:
-    """A steady run at a motor speed against a load torque, one output turn sampled after the start has decayed."""
+    """A steady run at a motor speed against a load torque: one output turn, after the start has decayed."""
     ratio = Drive.model_validate({"preset": preset}).ratio
     speed = rpm * 2 * math.pi / 60
     turn = abs(ratio) * 60 / rpm

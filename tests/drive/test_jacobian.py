@@ -90,7 +90,10 @@ def check(system: Any) -> None:
             error = min(
                 float(
                     np.max(
-                        np.abs(_slope(lambda e, k=k: system.rhs(t, y + e * _unit(n, k)), h) - jacobian[:, k])
+                        np.abs(
+                            _slope(lambda e, t=t, y=y, k=k: system.rhs(t, y + e * _unit(n, k)), h)
+                            - jacobian[:, k]
+                        )
                         * system.scale[k]
                         / typical
                     )
@@ -99,7 +102,12 @@ def check(system: Any) -> None:
             )
             assert error < 1e-5, f"column {k}"
         error = min(
-            float(np.max(np.abs(_slope(lambda e: system.rhs(t + e, y), h) - dfdt) / (np.abs(dfdt) + typical)))
+            float(
+                np.max(
+                    np.abs(_slope(lambda e, t=t, y=y: system.rhs(t + e, y), h) - dfdt)
+                    / (np.abs(dfdt) + typical)
+                )
+            )
             for h in (1e-5, 1e-6, 1e-7)
         )
         assert error < 1e-5

@@ -22,7 +22,7 @@ def teeth_of(mesh: dict[str, Any], **drive: Any) -> Any:
 
 
 def potential(teeth: Any, x: float, angle: float) -> float:
-    """Sum of w U(dead_zone(x + eps, b)) over all teeth, tooth by tooth in Python, from the contact law itself."""
+    """Sum of w U(dead_zone(x + eps, b)) over all teeth, one by one in Python, from the contact law itself."""
     engagement = teeth.mesh.engagement
     depths, weights = np.zeros(teeth.count), np.ones(teeth.count)
     for j in range(teeth.count):
@@ -51,6 +51,9 @@ MESHES = {
     "window": teeth_of({}),
     "clearance": teeth_of({"engagement": {"kind": "clearance"}}),
     "flank": teeth_of({"gap_along_flank": True, "pitch_error_m": 1e-6}),
+    "smooth": teeth_of(
+        {"gap_smoothing_m": 2e-7, "gap_along_flank": True, "engagement": {"kind": "clearance"}}
+    ),
 }
 
 
@@ -74,6 +77,15 @@ def test_derivatives_are_those_of_the_potential(name: str, x: float, angle: floa
     kink = 1e7
     assert by_x[1] == pytest.approx(here[2], rel=1e-3, abs=kink)
     assert by_a[1] == pytest.approx(here[5], rel=1e-2, abs=2e-2 * size + 5.0)
+
+
+def test_smooth_dead_zone_is_the_documented_one() -> None:
+    from hdsim.contact import smooth_dead_zone
+
+    for x, gap in ((1.4e-6, 1.5e-6), (1.6e-6, 1.5e-6), (5e-7, 1e-7), (1e-5, 1.5e-6)):
+        assert _mesh.smooth_depth(x, gap, 2e-7)[0] == pytest.approx(
+            float(smooth_dead_zone(x, gap, 2e-7)), rel=1e-12
+        )
 
 
 def test_tooth_forces_add_up_to_the_mesh_force() -> None:
