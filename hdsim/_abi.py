@@ -39,7 +39,9 @@ def _call(contract: str, address: Any, arguments: tuple[Any, ...]) -> Any:
         target = ir.FunctionType(ir.VoidType(), [context.get_value_type(kind) for kind in kinds])
         function = builder.inttoptr(values[0], target.as_pointer())
         handed = [
-            context.make_array(given)(context, builder, value).data if isinstance(given, types.Array) else value
+            context.make_array(given)(context, builder, value).data
+            if isinstance(given, types.Array)
+            else value
             for given, value in zip(signature.args[1:], values[1:], strict=True)
         ]
         builder.call(function, handed)
@@ -48,31 +50,31 @@ def _call(contract: str, address: Any, arguments: tuple[Any, ...]) -> Any:
     return types.void(types.intp, *typed), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def call_element(_context, address, inputs, parameters, own, columns, outputs, jacobian):  # type: ignore[no-untyped-def]
     """Call an element kernel."""
     return _call("element", address, (inputs, parameters, own, columns, outputs, jacobian))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def call_twist(_context, address, motor_angle, output_angle, parameters, error):  # type: ignore[no-untyped-def]
     """Call a twist kernel."""
     return _call("twist", address, (motor_angle, output_angle, parameters, error))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def call_mesh(_context, address, angles, error, parameters, result):  # type: ignore[no-untyped-def]
     """Call a mesh kernel."""
     return _call("mesh", address, (angles, error, parameters, result))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def call_signal(_context, address, time, inside, parameters, values):  # type: ignore[no-untyped-def]
     """Call a signal kernel."""
     return _call("signal", address, (time, inside, parameters, values))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def call_system(_context, address, t, y, integers, reals, scratch, want, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
     """Call a system kernel."""
     return _call("system", address, (t, y, integers, reals, scratch, want, dy, jacobian, dfdt))

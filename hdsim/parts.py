@@ -93,7 +93,7 @@ class Builder(Protocol):
         """Add a contribution to the mesh twist (kinematic error and its kin)."""
 
     def series_compliance(self, wind_up: Callable[[Array], Array]) -> None:
-        """Put a spring in series with the torsion spring: wind-up (rad, at the output) over torque (N m), odd."""
+        """Put a spring in series with the torsion spring: odd wind-up (rad, at output) over torque (N m)."""
 
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh, as an angle at the output."""

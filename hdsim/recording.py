@@ -61,7 +61,7 @@ class Event:
 
 @dataclass
 class Recording:
-    """A run: tables by name (``state`` at full rate, ``teeth`` at its own), static arrays, events, provenance.
+    """A run: tables by name (``state`` at full rate, ``teeth`` at its own), static arrays, events, metadata.
 
     ``recording["motor_angle"]`` reads the state table. ``static`` holds what does not change in time
     (tooth angles, gaps). ``metadata`` maps names to text (scenario, versions, seed, solver, tolerances).

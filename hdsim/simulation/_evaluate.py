@@ -7,7 +7,7 @@ from numba import njit
 from hdsim._abi import call_system
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def evaluate(address, t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
     """Call the system kernel at ``address``."""
     call_system(address, t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from hdsim.drive.catalogue import CatalogueFigures
 from hdsim.drive.parameters import Drive
 from hdsim.drive.presets import catalogue_figures
-from hdsim.drive.catalogue import CatalogueFigures
 from hdsim.errors import InputError
 from hdsim.recording import Recording
 from hdsim.scenario.model import Scenario
