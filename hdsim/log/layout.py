@@ -30,6 +30,7 @@ Topics = Mapping[str, Collection[str]]
 
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 _SHORT_S, _LONG_S = 10.0, 60.0
+_LEGEND_LINE_PX = 30
 _CAMERA_DISTANCE = 5.0
 """Of the camera from the drive, in pitch radii."""
 
@@ -86,7 +87,7 @@ def plot(title: str, *paths: str, over: str | None = None, dots: bool = False) -
             "value": path,
             "enabled": True,
             "timestampMethod": "receiveTime",
-            "label": path.split(".", 1)[1],
+            "label": _label(path, paths),
             "showLine": not dots,
         }
         for path in paths
@@ -100,13 +101,22 @@ def plot(title: str, *paths: str, over: str | None = None, dots: bool = False) -
         "showYAxisLabels": True,
         "isSynced": over is None,
         "xAxisVal": "timestamp" if over is None else "index" if over == "index" else "currentCustom",
-        "sidebarDimension": 240,
+        "sidebarDimension": _LEGEND_LINE_PX * len(paths) + 40,
     }
     drawn = paths
     if over not in (None, "index"):
         settings["xAxisPath"] = {"value": over, "enabled": True}
         drawn = (*paths, str(over))
     return Panel("Plot", title, settings, drawn)
+
+
+def _label(path: str, others: tuple[str, ...]) -> str:
+    """What tells a line from the others: its topic where the fields are the same, else its field."""
+    fields = {other.partition(".")[2] for other in others}
+    topic, _, field = path.partition(".")
+    if len(others) > 1 and len(fields) == 1:
+        return topic.removeprefix("/hd/").removesuffix("_view")
+    return field.removesuffix("_arcsec").removesuffix("_um").removesuffix("[:]")
 
 
 def scene(title: str = "Drive") -> Panel:

@@ -293,8 +293,8 @@ def static_entities(g: SceneGeometry, at: int, *, with_error: bool) -> list[Any]
     x = np.repeat(-0.8 + 0.1 * np.arange(16), 2) + np.tile([0.0, 0.1], 16)
     bar = np.column_stack([x, np.full(32, height), np.full(32, 0.2)]) * r
     _add_line(legend, shapes.segments(bar, np.repeat(shapes.force_colours(steps), 2, axis=0), 10.0))
-    for side, words in ((-1.3, "tooth force 0 N"), (1.2, f"{g.largest_force_n:.3g} N")):
-        legend.texts.append(shapes.text(words, (side * r, height * r, 0.2 * r), size))
+    for side, words in ((-0.8, "0 N"), (0.0, "tooth force"), (0.8, f"{g.largest_force_n:.3g} N")):
+        legend.texts.append(shapes.text(words, (side * r, (height - 0.14) * r, 0.2 * r), size))
 
     entities = [spline, generator, output, legend]
     if with_error:

@@ -43,6 +43,12 @@ def display_columns(columns: Sequence[ColumnSpec]) -> list[tuple[int, float, Col
     return found
 
 
+def scaled(values: Array, factor: float) -> Array:
+    """Values in another unit; numbers too large for it become infinite."""
+    with np.errstate(over="ignore"):
+        return values * factor
+
+
 class ViewStream:
     """The decimated twin of a table.
 
@@ -85,7 +91,7 @@ class ViewStream:
             self._loop.stream.flush()
 
     def _write(self, time: Array, columns: Sequence[Array]) -> None:
-        columns = [*columns, *(columns[index] * factor for index, factor in self._extra)]
+        columns = [*columns, *(scaled(columns[i], factor) for i, factor in self._extra)]
         begin = 0
         while begin < len(time):
             rows = slice(begin, begin + self._stream.room)

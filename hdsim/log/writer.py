@@ -15,7 +15,7 @@ from hdsim.log import naming
 from hdsim.log.container import Container
 from hdsim.log.streams import MessageStream, TableStream
 from hdsim.log.view import MinMaxView
-from hdsim.log.viewing import LoopStream, ViewStream, display_columns
+from hdsim.log.viewing import LoopStream, ViewStream, display_columns, scaled
 from hdsim.recording import Event, Table
 
 if TYPE_CHECKING:
@@ -145,8 +145,8 @@ class LogWriter:
                 {"view_of": naming.STATIC_TOPIC},
                 time=False,
             )
-            scaled = [row[index] * factor for index, factor, _ in extra]
-            shown.append(None, np.array([naming.EPOCH_NS]), scaled)
+            arrays = [scaled(row[index], factor) for index, factor, _ in extra]
+            shown.append(None, np.array([naming.EPOCH_NS]), arrays)
             shown.flush()
 
     def write(self, name: str, block: Table) -> None:

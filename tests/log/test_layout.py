@@ -101,7 +101,15 @@ def test_what_a_log_lacks_is_left_out(tmp_path):
     assert "3D!drive" not in built["configById"]
     assert "Indicator!contact" not in built["configById"]
     (error,) = (s for p, s in built["configById"].items() if p == "Plot!error")
-    assert [line["label"] for line in error["paths"]] == ["transmission_error_arcsec"]
+    assert [line["label"] for line in error["paths"]] == ["transmission_error"]
+
+
+def test_lines_are_told_apart_by_what_differs():
+    def labels(name, panel):
+        return [line["label"] for line in layout.build_layout(name)["configById"][panel]["paths"]]
+
+    assert labels("diagnose", "Plot!output_torque") == ["measured", "before", "after"]
+    assert labels("overview", "Plot!error") == ["tracking_error", "transmission_error"]
 
 
 @pytest.mark.parametrize(

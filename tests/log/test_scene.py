@@ -111,7 +111,7 @@ def test_bodies_and_legend_are_sent_once_on_a_topic_of_their_own(log):
     texts = " ".join(t.text for e in update.entities for t in e.texts)
     assert "deflection drawn x6" in texts
     assert "error of the output x1000" in texts
-    assert "tooth force 0 N" in texts
+    assert "0 N tooth force" in texts
     assert "24 N" in texts
     for entity in update.entities:
         for body in entity.triangles:
