@@ -14,6 +14,6 @@ def evaluate(address, times, insides, parameters):  # type: ignore[no-untyped-de
     result = np.empty((4, len(times)))
     values = np.empty(4)
     for k in range(len(times)):
-        call_signal(address, times[k], insides[k], parameters, values)  # type: ignore[call-arg]
+        call_signal(address, times[k], insides[k], parameters, values)
         result[:, k] = values
     return result
