@@ -102,7 +102,8 @@ class Teeth:
         self._header = header
         self._place_contact()
         self._place_gaps(seed)
-        header[_mesh.PITCH_ERROR_AT] = self._place(self.pitch_errors_m)
+        # Twice over, so that any run of neighbouring teeth is contiguous.
+        header[_mesh.PITCH_ERROR_AT] = self._place(np.tile(self.pitch_errors_m, 2))
         self._place_engagement()
         self._place_structure(wind_ups)
         # The wear comes last: the catalogue's stiffness belongs to the new drive.
@@ -147,6 +148,8 @@ class Teeth:
                 self.half_gaps_m = mesh.flanks.half_gaps(self.count, seed)
             cells = np.zeros((self.count, 1, 4))
             cells[:, 0, 0] = self.half_gaps_m
+            if isinstance(mesh.engagement, WindowEngagement) and mesh.gap_smoothing_m == 0.0:
+                header[_mesh.CONSTANT_GAPS_AT] = self._place(np.tile(self.half_gaps_m, 2))
         else:
             from scipy.interpolate import PchipInterpolator
 
@@ -197,7 +200,7 @@ class Teeth:
         return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
 
     def torque(self, twist: float) -> tuple[float, float]:
-        """Mean mesh torque at the ring (N m) and engaged share over the wave generator's angle, twist in rad."""
+        """Mean over the wave generator's angle of mesh torque (N m) and engaged share at a twist (rad)."""
         parameters = np.concatenate(self._blocks)
         angles = np.arange(PROBES) * np.pi / PROBES * (1 + 1 / self.count)
         samples = np.array(

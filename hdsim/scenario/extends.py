@@ -23,11 +23,26 @@ def read(path: str | Path) -> Source:
     Raises:
         ScenarioError: a file cannot be read, is not plain YAML, or the chain bites its tail.
     """
-    return flatten(_read(Path(path), []))
+    return flatten(read_tree(path))
+
+
+def read_tree(path: str | Path) -> Node:
+    """The same as a tree of nodes that know where they were written."""
+    return _read(Path(path), [])
 
 
 def _read(path: Path, chain: list[str]) -> Node:
-    node = read_node(path)
+    return resolve_extends(read_node(path), path, chain)
+
+
+def resolve_extends(node: Node, path: Path, chain: list[str]) -> Node:
+    """Lay a mapping that was written in ``path`` over what its ``extends`` names; removes that key.
+
+    Args:
+        node: a mapping.
+        path: file in which it is written; the base is looked for relative to it.
+        chain: real paths of the files that led here, to find circles.
+    """
     extends = node.value.pop("extends", None)
     if extends is None or extends.value is None:
         return node
