@@ -116,7 +116,7 @@ class LoopStream:
         self.stream = stream
         self._places = places
         self._recent = np.full((len(places), LOOP_SAMPLES), np.nan)
-        self._since = 0
+        self._since = LOOP_EVERY - 1  # the first at once, so that a log opens on something
         self._last: float | None = None
 
     @classmethod
@@ -146,7 +146,7 @@ class LoopStream:
 
     def finish(self) -> None:
         """Write the loop at the end of the run."""
-        if self._since:
+        if self._last is not None and self._since:
             self._write()
 
     def _write(self) -> None:
