@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from hdsim.errors import InputError
 
@@ -59,25 +59,11 @@ class BenchRun:
     recording: Recording
 
 
-class Build(Protocol):
-    """Builds the scenario of a procedure."""
-
-    def __call__(
-        self,
-        drive: Mapping[str, Any],
-        *,
-        effects: Mapping[str, Any] | None = None,
-        run: Mapping[str, Any] | None = None,
-        **options: Any,
-    ) -> Scenario:
-        """The bench test of a drive.
-
-        Args:
-            drive: section ``drive`` of a scenario, e.g. ``{"preset": "seed-2021"}``.
-            effects: section ``effects``; none when left out.
-            run: fields of the section ``run`` that replace the procedure's own (``seed``, ``rtol``, ...).
-            **options: the procedure's own, listed in its docstring.
-        """
+#: Builds a procedure's scenario: ``build(drive, *, effects=None, run=None, **options) -> Scenario``. ``drive``
+#: and ``effects`` are these sections of a scenario, e.g. ``{"preset": "seed-2021"}``; ``run`` holds fields of
+#: the section ``run`` that replace the procedure's own (``seed``, ``rtol``, ...); the options are those in
+#: the docstring of the procedure's ``build``.
+Build = Callable[..., "Scenario"]
 
 
 @dataclass(frozen=True)
