@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("hdsim.log.commands:info", "Show what is in a log."),
     "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
+    "layout": ("hdsim.log.commands:layout", "Print a layout that shows a log in Foxglove."),
     "recover": ("hdsim.log.commands:recover", "Save what a damaged or unfinished log holds."),
 }
 

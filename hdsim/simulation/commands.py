@@ -46,8 +46,11 @@ def run(scenario: Path, output: Path | None, plot: bool, verify: bool) -> int:
         click.echo(f"verified {'yes' if report.ok else 'NO: ' + '; '.join(report.problems)}")
     if plot:
         picture = path.with_suffix(".png")
-        hdsim.open_log(path).plot().savefig(picture)
-        click.echo(f"picture  {picture}")
+        try:
+            hdsim.open_log(path).plot().savefig(picture)
+            click.echo(f"picture  {picture}")
+        except InputError as error:
+            click.echo(f"picture  none: {error}")
     if done.failure:
         click.echo(f"error: the run stopped early: {done.failure}", err=True)
         return 1

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Motor speed beyond which a run is stopped: a hundred times what such motors reach, rad/s.
+FASTEST = 1e5
+
 #: Samples of the state table that leave together, and the longest span in samples.
 BLOCK = 4000
 
@@ -78,6 +81,10 @@ class Audit:
     def relative(self) -> float:
         """Residual over exchanged energy."""
         return self.residual / self.exchanged if self.exchanged > 0 else 0.0
+
+
+class RunawayError(ArithmeticError):
+    """A shaft is faster than any drive can be."""
 
 
 class RunFailed(HdsimError):  # noqa: N818 - read aloud: "run failed"
@@ -164,6 +171,14 @@ class Run:
         """
         from hdsim.drive import _assembly as a
 
+        velocity = self.model.place_of.get("motor", self.model.place_of.get("output", -1)) + 1
+
+        def watch(t: float, y: Array) -> None:
+            if abs(y[velocity]) > FASTEST:
+                raise RunawayError(f"{self.state_names()[velocity]} exceeds {FASTEST:g}")
+            if on_time is not None:
+                on_time(t)
+
         count = math.floor(self.duration_s * self.sample_rate_hz * (1 + 1e-12)) + 1
         samples = np.arange(count) / self.sample_rate_hz
         cuts = self.spans()
@@ -194,7 +209,7 @@ class Run:
                 t_eval=np.clip(wanted, t0, t1),
                 first_step=step,
                 max_step=self.max_step_s,
-                on_step=None if on_time is None else lambda t, _y: on_time(t),
+                on_step=watch,
             )
             self.statistics.add(found.statistics)
             got = found.y.shape[1]
@@ -253,11 +268,32 @@ class Run:
         """Record why the integration stopped."""
         self.interrupted = found.exception if isinstance(found.exception, KeyboardInterrupt) else None
         names = self.state_names()
-        worst = names[found.suspect] if found.suspect is not None else None
-        cause = f" The state that fails is {worst}." if worst else ""
-        state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, found.y_end, strict=True))
-        self.failure = f"{found.message}{cause} Last state: {state}."
+        values = found.y_end
+        state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, values, strict=True))
+        self.failure = f"{found.message} {self._likely_cause(found)} Last state: {state}."
         self.events.append(Event(found.t_end, "error", "solver", self.failure))
+
+    def _likely_cause(self, found: Any) -> str:
+        """One sentence on what probably stopped the integration."""
+        names = self.state_names()
+        if self.interrupted:
+            return "Stopped from outside."
+        if found.exception is not None and not isinstance(found.exception, RunawayError):
+            return "The method itself raised."
+        # The energies grow in any long run; the others are compared with the sizes that matter.
+        growth = np.abs(found.y_end[:-3]) / self.model.system.scale[:-3]
+        turned = self.model.place_of.get("motor")
+        if turned is not None:
+            growth[turned] = 0.0
+        worst = int(np.argmax(growth)) if len(growth) else 0
+        if len(growth) and (growth[worst] > 1e4 or isinstance(found.exception, RunawayError)):
+            return (
+                f"Likely cause: {names[worst]} runs away (unstable loop, wrong sign of a gain, "
+                f"or a torque that nothing balances)."
+            )
+        if found.suspect is not None:
+            return f"Likely cause: {names[found.suspect]} changes faster than the method can follow."
+        return "Likely cause: a parameter outside its law's range, or a tolerance tighter than rounding allows."
 
     def state_names(self) -> list[str]:
         """Names of the states, in their order in the state vector."""

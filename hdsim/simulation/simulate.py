@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -64,19 +66,35 @@ def simulate_to_log(
         The run, with audit, statistics and, if it stopped early, its ``failure``.
     """
     from hdsim.log import LogWriter
+    from hdsim.log.scene import SceneGeometry, SceneWriter
+    from hdsim.log.writer import view_rate
 
     run = build_run(scenario)
     started = time.perf_counter()
     static = run.static()
+    metadata = provenance(scenario)
     with LogWriter(
-        path, metadata=provenance(scenario), attachments={"scenario.yaml": scenario.to_yaml()}
+        path,
+        metadata=metadata,
+        attachments={"scenario.yaml": scenario.to_yaml()},
+        view_rate_hz=view_rate(scenario.run.duration_s),
+        compression=scenario.log.compression,
     ) as log:
+        scene = None
+        if scenario.log.scene:
+            geometry = SceneGeometry.from_metadata(metadata)
+            if run.model.teeth is not None:
+                # The colours reach to twice the mean tooth force at rated torque.
+                geometry = replace(geometry, largest_force_n=2 * run.model.teeth.rated_tooth_force_n)
+            scene = SceneWriter(log, geometry, scenario.run.duration_s)
         if static:
             log.write_static(static)
         told = 0
         for tables in run.blocks(on_time):
             for name, table in tables.items():
                 log.write(name, table)
+            if scene is not None:
+                scene.write(tables)
             for event in run.events[told:]:
                 log.write_event(event)
             told = len(run.events)
@@ -101,6 +119,15 @@ def provenance(scenario: Scenario) -> dict[str, str]:
         "python": platform.python_version(),
         "platform": platform.platform(),
     }
+    geometry = scenario.drive.geometry
+    found["geometry"] = json.dumps(
+        {
+            "flexspline_teeth": geometry.flexspline_teeth,
+            "circular_spline_teeth": geometry.circular_spline_teeth,
+            "pitch_radius_m": geometry.pitch_radius_m,
+            "circular_spline_fixed": scenario.drive.arrangement == "circular_spline_fixed",
+        }
+    )
     found |= {f"version_{name}": version(name) for name in _PACKAGES}
     git = _git_state()
     if git:
