@@ -1,0 +1,19 @@
+"""Figures: one page for a run, a Bode plot for a linear model. Matplotlib is imported when one is drawn."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hdsim.plot.page import plot_recording as plot_recording
+
+_HOME = {"plot_recording": "page"}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
