@@ -7,7 +7,7 @@ from typing import Any
 
 from hdsim.drive.parameters import Drive
 
-#: Bandwidths of the cascade: of the position loop, of the velocity loop, and integral over velocity gain, 1/s.
+#: Bandwidths of the cascade, 1/s: position loop, velocity loop, integral over velocity gain.
 _POSITION, _VELOCITY, _INTEGRAL = 40.0, 200.0, 20.0
 
 

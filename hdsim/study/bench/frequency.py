@@ -112,7 +112,7 @@ def build(
 
 
 def plot(runs: Sequence[BenchRun]) -> Figure:
-    """Velocity of the output over the torque, gain, phase and coherence, for each way of exciting the drive."""
+    """Output velocity and wind-up rate over torque, phase and coherence, for each way of exciting it."""
     words, answers = [], []
     for one in runs:
         channel, lines, period = excitation(one.scenario)
@@ -126,8 +126,8 @@ def plot(runs: Sequence[BenchRun]) -> Figure:
         plain = analytic_frequency(one.scenario.drive, one.scenario.load.inertia_kg_m2, locked=locked)
         answers.append((name, style.ORANGE if locked else style.BLUE, response, wind, found))
         words.append(
-            f"{name}: resonance {found:.1f} Hz (two masses with K2: {plain:.1f}); order 2 of the kinematic error "
-            f"meets it at {30.0 * found:.0f} rpm, order 4 at {15.0 * found:.0f} rpm."
+            f"{name}: resonance {found:.1f} Hz (two masses with K2: {plain:.1f}); order 2 of the "
+            f"kinematic error meets it at {30.0 * found:.0f} rpm, order 4 at {15.0 * found:.0f} rpm."
         )
     with page("Frequency response", "\n".join(words), runs[0].recording, 7.4) as figure:
         gain, twisting, phase, coherent = figure.subplots(2, 2, sharex=True).ravel()

@@ -193,8 +193,8 @@ def plot_starting(runs: Sequence[BenchRun]) -> Figure:
     side = "output" if backward else "motor"
     title = "Back-driving torque" if backward else "Starting torque"
     about = (
-        f"{title} {factor * measured:.3g} {unit}: the torque on the {side} at which the drive starts to turn.\n"
-        + ("The motor is free." if backward else "The output is free and unloaded.")
+        f"{title} {factor * measured:.3g} {unit}: the torque on the {side} at which the drive starts "
+        "to turn.\n" + ("The motor is free." if backward else "The output is free and unloaded.")
     )
     torque = np.abs(recording[channel])
     begin = float(recording.time[np.searchsorted(torque, measured)])
@@ -272,7 +272,11 @@ def plot_efficiency(runs: Sequence[BenchRun]) -> Figure:
             axes.clabel(lines, fmt="%d %%", fontsize=8)
             axes.plot(points.speed * 30.0 / math.pi, points.load, ".", color="black", markersize=3)
             axes.grid(False)
-            axes.set(xlabel="motor speed (rpm)", title=f"Lubricant at {_temperature(run)}")
+            axes.set(
+                xlabel="motor speed (rpm)",
+                title=f"Lubricant at {_temperature(run)}",
+                ylim=(loads[loads > 0].min(), loads.max()),
+            )
         row[0].set_ylabel("load torque (N m)")
         figure.colorbar(drawn, ax=list(row), label="efficiency (%); dots: simulated", pad=0.01)
     return figure

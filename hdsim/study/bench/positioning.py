@@ -47,7 +47,7 @@ def build(
     load_torque_nm: float = 0.0,
     bearing_friction_nm: float = 0.5,
 ) -> Scenario:
-    """The standard test cycle: up through all targets and down again, five times, with an overrun at both ends.
+    """The standard test cycle: up through all targets and down again, with an overrun at both ends.
 
     Args:
         drive: section ``drive``.
@@ -61,8 +61,8 @@ def build(
         dwell_s: rest at each target; its last fifth is what counts.
         load_inertia_kg_m2: inertia of the table.
         load_torque_nm: constant torque on the table.
-        bearing_friction_nm: Coulomb friction of the table's bearing, without which it rattles in the play; the
-            effects' own ``load_side_friction`` wins.
+        bearing_friction_nm: Coulomb friction of the table's bearing, without which it rattles in the play;
+            the effects' own ``load_side_friction`` wins.
 
     Raises:
         InputError: fewer than two cycles or no target.
@@ -95,10 +95,10 @@ def plot(runs: Sequence[BenchRun]) -> Figure:
     at = np.degrees(targets)
     about = (
         f"A = {errors.accuracy:.1f}, E = {errors.systematic:.1f}, M = {errors.mean_error:.1f}, "
-        f"B = {errors.reversal:.1f} (mean {errors.mean_reversal:.1f}), R = {errors.repeatability:.1f} arcsec, "
+        f"B = {errors.reversal:.1f} (mean {errors.mean_reversal:.1f}), R = {errors.repeatability:.1f}, "
         f"R up = {errors.repeatability_up:.2g}, R down = {errors.repeatability_down:.2g} arcsec.\n"
-        f"{len(at)} targets, {errors.up.shape[1]} approaches from each side; the motor's encoder closes the loop, "
-        "the output is measured."
+        f"{len(at)} targets, {errors.up.shape[1]} approaches from each side. "
+        "The motor's encoder closes the loop, the output is measured."
     )
     with page("Bidirectional positioning, ISO 230-2", about, recording) as figure:
         axes = figure.subplots()
@@ -195,7 +195,8 @@ def build_repeatability(
         dwell_s: rest at each pose; its last fifth is what counts.
         load_inertia_kg_m2: inertia of the load.
         load_torque_nm: constant torque on the load.
-        bearing_friction_nm: Coulomb friction of the output bearing; the effects' own ``load_side_friction`` wins.
+        bearing_friction_nm: Coulomb friction of the output bearing; the effects' own
+            ``load_side_friction`` wins.
     """
     made = Drive.model_validate(dict(drive))
     order = [*poses_deg[1:], poses_deg[0]]
@@ -224,7 +225,8 @@ def plot_repeatability(runs: Sequence[BenchRun]) -> Figure:
     }
     about = (
         f"Half range ±{figures['repeatability']:.3g} arcsec (as makers of gears state it); ISO 9283: "
-        f"±3 S = ±{figures['repeatability_angle']:.3g} arcsec, RP = {figures['repeatability_positioning']:.3g} arcsec.\n"
+        f"±3 S = ±{figures['repeatability_angle']:.3g} arcsec, "
+        f"RP = {figures['repeatability_positioning']:.3g} arcsec.\n"
         "The run is deterministic: what scatters is the history of hysteresis and friction, not chance."
     )
     with page("Repeatability, ISO 9283", about, recording, 5.5) as figure:

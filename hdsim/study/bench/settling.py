@@ -45,7 +45,8 @@ def build(
         dwell_s: rest after each move, long enough to come to rest.
         load_inertia_kg_m2: inertia of the load.
         load_torque_nm: constant torque on the load.
-        bearing_friction_nm: Coulomb friction of the output bearing; the effects' own ``load_side_friction`` wins.
+        bearing_friction_nm: Coulomb friction of the output bearing; the effects' own
+            ``load_side_friction`` wins.
     """
     made = Drive.model_validate(dict(drive))
     moves, seconds = moves_between(
@@ -71,8 +72,8 @@ def plot(runs: Sequence[BenchRun]) -> Figure:
     slowest = max(settling(recording, dwell) for dwell in rests)
     beyond = ARCSEC * max(overshoot(recording, dwell) for dwell in rests)
     about = (
-        f"Settles within ±{ARCSEC * BAND:.0f} arcsec of the attained angle {1e3 * slowest:.0f} ms after the end of the "
-        f"command; overshoot {beyond:.1f} arcsec.\n"
+        f"Settles within ±{ARCSEC * BAND:.0f} arcsec of the attained angle {1e3 * slowest:.0f} ms after the "
+        f"end of the command; overshoot {beyond:.1f} arcsec.\n"
         f"Tracking error {rms:.1f} arcsec rms, {largest:.1f} arcsec at most."
     )
     with page("Move and settle", about, recording, 7.2) as figure:

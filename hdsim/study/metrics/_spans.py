@@ -121,7 +121,7 @@ def plateaus(recording: Recording, settle: float = 0.4, shortest_s: float = 0.05
     fast = np.max(np.abs(speed), initial=0.0)
     strong = np.max(np.abs(load), initial=0.0)
     step = np.gradient(time)
-    calm = np.abs(np.gradient(speed)) <= 1e-3 * fast * np.maximum(step / 1e-3, 1.0)
+    calm = np.abs(np.gradient(speed)) <= np.abs(speed) * step
     calm &= np.abs(np.gradient(load)) <= 1e-6 * strong + 1e-12
     calm &= np.abs(speed) > 1e-3 * fast
     found = []

@@ -1,0 +1,212 @@
+"""The commands ``bench`` and ``presets``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
+
+    from hdsim.study.bench.report import Line, Row
+
+
+@click.command()
+@click.argument("drive")
+@click.option(
+    "--only", multiple=True, metavar="NAME", help="Only this procedure; may be given several times."
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder for the pictures [default: bench/NAME].",
+)
+@click.option("--plot/--no-plot", default=True, show_default=True, help="Draw a picture of every procedure.")
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of the rough flanks.")
+@click.option("--list", "listing", is_flag=True, is_eager=True, help="List the procedures and their metrics.")
+def bench(
+    drive: str, only: tuple[str, ...], output: Path | None, plot: bool, seed: int | None, listing: bool
+) -> int:
+    """Put DRIVE on the test bench: a preset's name, or a scenario whose drive and effects are taken.
+
+    A preset is tested with kinematic error and torsional hysteresis on. Prints every figure beside the
+    catalogue's line, if there is one.
+    """
+    from hdsim.study.bench.report import figures_of, run_procedure
+    from hdsim.study.registry import find_procedure, procedures
+
+    chosen = [find_procedure(name) for name in only] or list(procedures().values())
+    if listing:
+        for one in chosen:
+            click.echo(f"{one.name}: {one.title} ({one.source})")
+            click.echo(f"    {', '.join(one.metrics)}")
+        return 0
+    name, section, effects, run, lines = _drive(drive)
+    if seed is not None:
+        run["seed"] = seed
+    folder = Path("bench") / name if output is None else output
+    rows: list[Row] = []
+    pictures: list[Path] = []
+    with _progress() as on_time:
+        for one in chosen:
+            runs = run_procedure(one, section, effects=effects, run=run, on_time=on_time)
+            rows += figures_of(one, runs, lines)
+            if plot:
+                pictures.append(_save(one.plot(runs), folder / f"{one.name}.png"))
+    _print(rows, f"{name} on the test bench")
+    for picture in pictures:
+        click.echo(f"picture  {picture}")
+    missed = [row.metric for row in rows if row.holds is False]
+    if missed:
+        click.echo(f"outside the catalogue's lines: {', '.join(missed)}", err=True)
+    return 1 if missed else 0
+
+
+@click.command()
+@click.argument("name", required=False)
+def presets(name: str | None) -> None:
+    """List the drives that are ready to use, or what is printed about the one called NAME."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from hdsim.drive.catalogue import Figure
+    from hdsim.drive.presets import catalogue_figures, preset_names
+    from hdsim.errors import InputError
+
+    if name is not None:
+        try:
+            figures = catalogue_figures(name)
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        table = Table("quantity (SI units)", "value", "seen", "source", title=f"Printed about {name}")
+        for field, value in vars(figures).items():
+            if isinstance(value, Figure):
+                table.add_row(
+                    field.replace("_", " "),
+                    f"{value.value:.4g}",
+                    value.source.confidence,
+                    value.source.citation,
+                )
+        for rpm, value in figures.running_torque:
+            table.add_row(
+                f"running torque, {rpm:g} rpm",
+                f"{value.value:.4g}",
+                value.source.confidence,
+                value.source.citation,
+            )
+        Console().print(table)
+        return
+    columns = ("ratio", "rated torque, N m", "K1, N m/rad", "K3, N m/rad", "accuracy, arcmin")
+    table = Table("preset", title="Presets")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for known in preset_names():
+        figures = catalogue_figures(known)
+        table.add_row(
+            known,
+            f"{figures.ratio:g}",
+            f"{figures.rated_torque.value:g}",
+            f"{figures.stiffness_k1.value:g}",
+            f"{figures.stiffness_k3.value:g}",
+            f"{figures.accuracy.value * 3437.7467707849396:.2g}",
+        )
+    Console().print(table)
+
+
+def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any], dict[str, Line]]:
+    """Name, sections ``drive`` and ``effects``, fields of ``run``, and the catalogue's lines.
+
+    Raises:
+        InputError: neither a preset nor a scenario that can be read.
+    """
+    from hdsim.drive.presets import catalogue_figures, preset_names
+    from hdsim.errors import InputError
+    from hdsim.study.bench.report import DEFAULT_EFFECTS, catalogue_lines
+
+    if given in preset_names():
+        return given, {"preset": given}, dict(DEFAULT_EFFECTS), {}, catalogue_lines(catalogue_figures(given))
+    path = Path(given)
+    if not path.exists():
+        try:
+            catalogue_figures(given)
+        except ValueError as error:
+            raise InputError(f"DRIVE: found {given!r}, neither a file nor a preset: {error}") from None
+    import hdsim
+
+    scenario = hdsim.load_scenario(path)
+    kept = ("method", "rtol", "atol", "max_step_s", "seed")
+    run = {name: value for name in kept if (value := getattr(scenario.run, name)) is not None}
+    preset = scenario.drive.preset
+    lines = {} if preset is None else catalogue_lines(catalogue_figures(preset))
+    effects = {name: effect.model_dump() for name, effect in scenario.effects.active().items()}
+    return path.stem, scenario.drive.model_dump(), effects, run, lines
+
+
+def _print(rows: list[Row], title: str) -> None:
+    """The figures as a table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title)
+    table.add_column("test")
+    table.add_column("figure")
+    table.add_column("simulated", justify="right")
+    table.add_column("catalogue", justify="right")
+    table.add_column("unit")
+    table.add_column("inside")
+    last = ""
+    for row in rows:
+        if row.procedure != last and last:
+            table.add_section()
+        verdict = {None: "", True: "[green]yes[/]", False: "[bold red]NO[/]"}[row.holds]
+        table.add_row(
+            row.procedure if row.procedure != last else "",
+            row.metric,
+            row.problem or f"{row.value:.4g}",
+            "" if row.line is None else str(row.line),
+            row.unit,
+            verdict,
+        )
+        last = row.procedure
+    Console().print(table)
+
+
+def _save(figure: Any, path: Path) -> Path:
+    """Write a picture.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from hdsim.errors import InputError
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path)
+    except OSError as error:
+        raise InputError(f"{path}: the picture cannot be written ({error.strerror})") from error
+    return path
+
+
+def _progress() -> AbstractContextManager[Callable[[str, float, float], object] | None]:
+    """A bar over the simulated time of each run on a terminal; nothing elsewhere."""
+    from contextlib import contextmanager
+
+    @contextmanager
+    def bar() -> Iterator[Callable[[str, float, float], object] | None]:
+        if not sys.stderr.isatty():
+            yield None
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+            task = shown.add_task("")
+            yield lambda label, t, end: shown.update(task, description=label, completed=t, total=end)
+
+    return bar()
