@@ -199,6 +199,23 @@ class Teeth:
             )
         return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
 
+    def close_gaps(self, numbers: Array) -> None:
+        """Close the surfaces' gaps in a built mesh; the structure keeps the stiffness that it was calibrated to.
+
+        Args:
+            numbers: the compiled mesh's numbers, changed in place. The potential of a tabulated mesh is not.
+        """
+        first, length = int(numbers[_mesh.GAP_AT]), self.count * int(numbers[_mesh.GAP_CELLS]) * 4
+        numbers[first : first + length] = 0.0
+        if constant := int(numbers[_mesh.CONSTANT_GAPS_AT]):
+            numbers[constant : constant + 2 * self.count] = 0.0
+
+    def remove_pitch_errors(self, numbers: Array) -> None:
+        """Take the pitch errors out of a built mesh; see ``close_gaps``."""
+        first = int(numbers[_mesh.PITCH_ERROR_AT])
+        numbers[first : first + 2 * self.count] = 0.0
+        numbers[_mesh.LARGEST_PITCH_ERROR] = 0.0
+
     def torque(self, twist: float) -> tuple[float, float]:
         """Mean over the wave generator's angle of mesh torque (N m) and engaged share at a twist (rad)."""
         parameters = np.concatenate(self._blocks)

@@ -122,10 +122,14 @@ def _tell_summary(summaries: list[Any], confidence: float) -> None:
 @click.command()
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.option("--metric", help="Split this metric instead of the positioning error.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture [default: results].")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture [default: results]."
+)
 @_workers
 @_scheduler
-def budget(scenario: Path, metric: str | None, output: Path | None, workers: int, scheduler: str | None) -> None:
+def budget(
+    scenario: Path, metric: str | None, output: Path | None, workers: int, scheduler: str | None
+) -> None:
     """Split the positioning error of SCENARIO into its causes.
 
     Every cause is switched off alone, and on alone; what the causes do together is the interaction.
@@ -155,18 +159,30 @@ def budget(scenario: Path, metric: str | None, output: Path | None, workers: int
 @click.argument("scenario", type=click.Path(path_type=Path))
 @click.option("--metric", required=True, help="What must stay within the limit.")
 @click.option("--limit", type=float, required=True, help="Largest allowed value of the metric, in its unit.")
-@click.option("--parameter", required=True, help="Dotted name of the parameter, as in drive.mesh.pitch_error_m.")
+@click.option(
+    "--parameter", required=True, help="Dotted name of the parameter, as in drive.mesh.pitch_error_m."
+)
 @click.option(
     "--confidence", type=click.FloatRange(0.5, 1.0, max_open=True), default=0.95, show_default=True,
     help="Share of the drives that must meet the limit.",
 )  # fmt: skip
 @click.option(
-    "--replicates", type=click.IntRange(min=1), default=20, show_default=True, help="Drives with other surfaces."
+    "--replicates",
+    type=click.IntRange(min=1),
+    default=20,
+    show_default=True,
+    help="Drives with other surfaces.",
 )
-@click.option("--low", type=float, help="Lower end of the range [default: a hundredth of the scenario's value].")
-@click.option("--high", type=float, help="Upper end of the range [default: a hundred times the scenario's value].")
+@click.option(
+    "--low", type=float, help="Lower end of the range [default: a hundredth of the scenario's value]."
+)
+@click.option(
+    "--high", type=float, help="Upper end of the range [default: a hundred times the scenario's value]."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the drives.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture [default: results].")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture [default: results]."
+)
 @_workers
 @_scheduler
 def tolerance(
@@ -191,7 +207,9 @@ def tolerance(
     loaded = hdsim.load_scenario(scenario)
 
     def tell(probe: Probe) -> None:
-        click.echo(f"  {probe.value:<12.5g} {probe.passing:>6.1%} of the drives within, quantile {probe.quantile:.4g}")
+        click.echo(
+            f"  {probe.value:<12.5g} {probe.passing:>6.1%} of the drives within, quantile {probe.quantile:.4g}"
+        )
 
     with executor(workers, scheduler) as (pool, width):
         found = find_tolerance(

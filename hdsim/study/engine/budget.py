@@ -15,6 +15,7 @@ from __future__ import annotations
 import copy
 import csv
 import json
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
     from hdsim.recording import Recording
     from hdsim.scenario.model import Scenario
-    from hdsim.simulation.run import Run
 
 Array = NDArray[np.float64]
 
@@ -45,6 +45,8 @@ _FRICTION = (
     "input_coulomb_viscous", "stribeck_friction", "lugre_friction", "load_dependent_loss", "load_side_friction",
     "thermal_friction", "motor_torque_ripple",
 )  # fmt: skip
+#: Damping, as a share of the critical, of the load on the drive once no controller damps it.
+_DAMPING = 0.2
 #: Parameters of the drive that are friction of its input.
 _DRIVE_FRICTION = ("coulomb_nm", "viscous_nm_s_per_rad", "load_coefficient")
 
@@ -122,7 +124,9 @@ class Budget:
             for part in self.parts:
                 writer.writerow([part.cause.title, part.removed, part.alone, part.cause.switched])
             writer.writerow(["rest", self.rest, self.rest, "error with all causes off"])
-            writer.writerow(["interaction", self.interaction, self.interaction_alone, "whole less all of the above"])
+            writer.writerow(
+                ["interaction", self.interaction, self.interaction_alone, "whole less all of the above"]
+            )
             writer.writerow(["whole", self.whole, self.whole, "error with all causes on"])
         return path
 
@@ -137,6 +141,10 @@ def _no_friction(data: dict[str, Any]) -> None:
     if motor["type"] == "position":
         # A motor on its commanded path needs no controller, and no friction moves it off.
         data["command"]["motor"] = {"type": "motion", "trajectory": motor["trajectory"], "at": motor["at"]}
+        # The controller also damped the load's vibration. Damping changes nothing at rest.
+        torsion = data["drive"]["torsion"]
+        critical = 2.0 * math.sqrt(torsion["stiffness_k3_nm_per_rad"] * data["load"]["inertia_kg_m2"])
+        torsion["damping_nm_s_per_rad"] = max(torsion["damping_nm_s_per_rad"], _DAMPING * critical)
     else:
         for name in _DRIVE_FRICTION:
             data["drive"]["friction"][name] = 0.0
@@ -155,15 +163,19 @@ def causes(scenario: Scenario) -> tuple[Cause, ...]:
         return tuple(name for name in names if name in on)
 
     if toothed and getattr(mesh, "half_gap_m", None) != 0:
-        found.append(Cause("backlash", "tooth backlash", "gaps between the flanks closed, stiffness kept"))
+        title = "tooth backlash" if getattr(mesh, "half_gap_m", None) is not None else "W-M tooth backlash"
+        found.append(Cause("backlash", title, "gaps between the flanks closed, stiffness kept"))
     pitch = toothed and getattr(mesh, "pitch_error_m", 0.0) > 0
     if group(_KINEMATIC) or pitch:
-        names = [*(name.replace("_", " ") for name in group(_KINEMATIC)), *(["pitch errors"] if pitch else [])]
-        found.append(Cause("kinematic_error", "kinematic error", " and ".join(names) + " off", group(_KINEMATIC)))
-    if scenario.load.torque is not None or scenario.load.gravity is not None:
+        names = [
+            *(name.replace("_", " ") for name in group(_KINEMATIC)),
+            *(["pitch errors"] if pitch else []),
+        ]
         found.append(
-            Cause("wind_up", "wind-up under load", "load torque and gravity off", (), _no_load)
+            Cause("kinematic_error", "kinematic error", " and ".join(names) + " off", group(_KINEMATIC))
         )
+    if scenario.load.torque is not None or scenario.load.gravity is not None:
+        found.append(Cause("wind_up", "wind-up under load", "load torque and gravity off", (), _no_load))
     if group(_HYSTERESIS):
         found.append(Cause("hysteresis", "hysteresis", "torsional hysteresis off", group(_HYSTERESIS)))
     motor = scenario.command.motor.type
@@ -186,7 +198,8 @@ def causes(scenario: Scenario) -> tuple[Cause, ...]:
     taken = {name for cause in found for name in cause.effects}
     known = catalogue()
     found += [
-        Cause(name, known[name].title, f"{name.replace('_', ' ')} off", (name,)) for name in sorted(on - taken)
+        Cause(name, known[name].title, f"{name.replace('_', ' ')} off", (name,))
+        for name in sorted(on - taken)
     ]
     return tuple(found)
 
@@ -275,7 +288,9 @@ def _error(
         # A prescribed motor has no controller that knows the command; the error is against it all the same.
         columns = recording.state.columns
         columns["reference_angle"] = Column(reference, "rad", "commanded angle, at the output")
-        columns["tracking_error"] = Column(recording["output_angle"] - reference, "rad", "output less commanded")
+        columns["tracking_error"] = Column(
+            recording["output_angle"] - reference, "rad", "output less commanded"
+        )
     if dwell is None:
         return find_metric(error)(recording, scenario)
     return float(np.degrees(np.mean(recording["tracking_error"][slice(*dwell)])) * 3600.0)
@@ -287,6 +302,7 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
     Raises:
         HdsimError: the run stopped early.
     """
+    from hdsim.drive import _assembly
     from hdsim.scenario.model import Scenario
     from hdsim.simulation.setup import build_run
 
@@ -300,48 +316,20 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
             cause.change(data)
     scenario = Scenario.model_validate(data)
     run = build_run(scenario)
-    for cause in off:
-        if cause.name == "backlash":
-            _close_gaps(run)
-        elif cause.name == "kinematic_error":
-            _true_pitch(run)
+    model = run.model
+    if model.teeth is not None:
+        numbers = model.system.reals[int(model.system.integers[_assembly.MESH_AT]) :]
+        for cause in off:
+            if cause.name == "backlash":
+                model.teeth.close_gaps(numbers)
+            elif cause.name == "kinematic_error":
+                model.teeth.remove_pitch_errors(numbers)
     recording = run.record()
     if run.interrupted is not None:
         raise run.interrupted
     if run.failure:
         raise HdsimError(f"with only {', '.join(on) or 'nothing'} on, the run stopped early: {run.failure}")
     return recording, scenario
-
-
-def _mesh_numbers(run: Run) -> Array:
-    """The compiled mesh's numbers in the system's, as a view."""
-    from hdsim.drive import _assembly
-
-    at = int(run.model.system.integers[_assembly.MESH_AT])
-    return run.model.system.reals[at:]
-
-
-def _close_gaps(run: Run) -> None:
-    """Close the teeth's gaps in the built model: the structure keeps the stiffness it was calibrated to."""
-    from hdsim.drive import _mesh
-
-    teeth = run.model.teeth
-    if teeth is not None:
-        numbers = _mesh_numbers(run)
-        first = int(numbers[_mesh.GAP_AT])
-        numbers[first : first + teeth.count * int(numbers[_mesh.GAP_CELLS]) * 4] = 0.0
-
-
-def _true_pitch(run: Run) -> None:
-    """Take the pitch errors out of the built model."""
-    from hdsim.drive import _mesh
-
-    teeth = run.model.teeth
-    if teeth is not None:
-        numbers = _mesh_numbers(run)
-        first = int(numbers[_mesh.PITCH_ERROR_AT])
-        numbers[first : first + teeth.count] = 0.0
-        numbers[_mesh.LARGEST_PITCH_ERROR] = 0.0
 
 
 def plot_budget(budget: Budget) -> Figure:
@@ -369,7 +357,9 @@ def plot_budget(budget: Budget) -> Figure:
             at = last - k
             axes.barh(at, value, left=start, color=colour, height=0.6)
             if k < len(budget.parts):
-                axes.plot(start + budget.parts[k].alone, at, "o", mfc="white", mec=style.ORANGE, mew=1.6, ms=7)
+                axes.plot(
+                    start + budget.parts[k].alone, at, "o", mfc="white", mec=style.ORANGE, mew=1.6, ms=7
+                )
                 ends.append(start + budget.parts[k].alone)
             axes.plot([start + value] * 2, [at + 0.3, at - 1.3], color="#888888", lw=0.7)
             start += value

@@ -42,6 +42,18 @@ def key_of(definition: dict[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def _lock(file: IO[bytes], path: Path) -> None:
+    """Keep a second study away from the file; the lock ends with the process, even when that is killed."""
+    try:
+        import fcntl
+    except ImportError:  # no such locks on Windows
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(f"{path} is in use by another study that is still running") from None
+
+
 class Journal:
     """Rows of the runs that are done, in a file.
 
@@ -66,7 +78,8 @@ class Journal:
             good = 0
             if not fresh and path.exists():
                 good = self._read()
-            self._file = path.open("r+b" if good else "wb")
+            self._file = path.open("r+b" if path.exists() else "w+b")
+            _lock(self._file, path)
             self._file.seek(good)
             self._file.truncate()
             if not good:

@@ -225,7 +225,9 @@ def plot_tolerance(found: Tolerance) -> Figure:
         for p in probes:
             axes.plot(np.full(len(p.metric), p.value), p.metric, ".", color=style.BLUE, alpha=0.35, ms=4)
         shown = np.array([p.quantile if np.isfinite(p.quantile) else np.nan for p in probes])
-        axes.plot(x, shown, "-o", ms=4, color=style.BLUE, label=f"{found.confidence:.0%} of the drives stay below")
+        axes.plot(
+            x, shown, "-o", ms=4, color=style.BLUE, label=f"{found.confidence:.0%} of the drives stay below"
+        )
         axes.axhline(found.limit, color=style.ORANGE, label=f"limit {found.limit:g} {found.unit}")
         if found.value is not None:
             axes.axvline(

@@ -6,7 +6,7 @@ import copy
 import json
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -220,9 +220,21 @@ def measured(names: Sequence[str], recording: Recording, scenario: Scenario) -> 
     return values, "; ".join(reasons)
 
 
-def warm_start(modules: Mapping[str, None] | Sequence[str] = ("hdsim.simulation.setup",)) -> None:
-    """Import what a run needs; the initializer of worker processes."""
+def warm_start() -> None:
+    """Import what a run needs, and end with the process that started this one; initializer of worker processes."""
     import importlib
+    import multiprocessing
+    import os
+    import threading
+    from multiprocessing.connection import wait
 
-    for module in modules:
-        importlib.import_module(module)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def follow() -> None:
+            # Workers hold both ends of their queue, so they would wait for ever for a parent that was killed.
+            wait([parent.sentinel])
+            os._exit(1)
+
+        threading.Thread(target=follow, daemon=True).start()
+    importlib.import_module("hdsim.simulation.setup")
