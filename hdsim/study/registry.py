@@ -59,10 +59,10 @@ class BenchRun:
     recording: Recording
 
 
-#: Builds a procedure's scenario: ``build(drive, *, effects=None, run=None, **options)`` returns a Scenario;
-#: ``drive`` and ``effects`` are these sections of a scenario, e.g. ``{"preset": "seed-2021"}``; ``run`` holds fields
-#: of the section ``run`` that replace the procedure's own (``seed``, ``rtol``, ...); the options are those
-#: in the docstring of the procedure's ``build``.
+#: Builds a procedure's scenario: ``build(drive, *, effects=None, run=None, **options)`` returns a Scenario.
+#: ``drive`` and ``effects`` are these sections of a scenario, e.g. ``{"preset": "seed-2021"}``; ``run`` holds
+#: fields of the section ``run`` that replace the procedure's own (``seed``, ``rtol``, ...); the options are
+#: those in the docstring of the procedure's ``build``.
 Build = Callable[..., "Scenario"]
 
 

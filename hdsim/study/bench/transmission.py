@@ -33,7 +33,7 @@ def build(
     effects: Mapping[str, Any] | None = None,
     run: Mapping[str, Any] | None = None,
     motor_rpm: float = 300.0,
-    load_inertia_kg_m2: float = 0.02,
+    load_inertia_kg_m2: float = 0.005,
     bearing_friction_nm: float = 0.5,
 ) -> Scenario:
     """A turn of the output forward and back at a constant motor speed, without load.

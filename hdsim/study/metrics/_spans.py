@@ -93,7 +93,9 @@ def dwells(recording: Recording, shortest_s: float = 0.05) -> list[Dwell]:
             continue
         target = float(reference[part.stop - 1])
         if abs(target - before) > 1e-8:
-            found.append(Dwell(part, target, target - before))
+            # The sample before is the one at which the command arrived.
+            arrived = slice(max(0, part.start - 1), part.stop)
+            found.append(Dwell(arrived, target, target - before))
         before = target
     if not found:
         raise InputError("positioning needs a dwell after a move; the commanded angle never rests after one")

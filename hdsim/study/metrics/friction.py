@@ -124,10 +124,10 @@ def running_torque(recording: Recording, scenario: Scenario) -> float:
 
 @metric("efficiency", "1", "work out over work in, at the plateau with the largest load and speed", _MANUAL)
 def efficiency(recording: Recording, scenario: Scenario) -> float:
-    """Efficiency at the plateau of largest power delivered."""
+    """Efficiency at the plateau of largest power delivered; driving counts before back-driving."""
     points = operating_points(recording)
     loaded = np.flatnonzero(np.isfinite(points.efficiency))
     if not len(loaded):
         raise InputError("efficiency needs a plateau of constant speed with a load torque")
-    power = np.abs(points.load * points.speed)[loaded]
+    power = (points.load * points.speed)[loaded]
     return float(points.efficiency[loaded[np.argmax(power)]])

@@ -50,7 +50,7 @@ def approaches(recording: Recording) -> list[Approaches]:
     found: dict[tuple[float, int], list[float]] = {}
     angle = recording["output_angle"]
     for dwell in dwells(recording):
-        key = (round(dwell.target, 7), 1 if dwell.move > 0 else -1)
+        key = (round(dwell.target, 9), 1 if dwell.move > 0 else -1)
         found.setdefault(key, []).append(dwell.attained(angle) - dwell.target)
     return [Approaches(target, way, np.array(found[target, way])) for target, way in sorted(found)]
 
