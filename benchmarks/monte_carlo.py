@@ -2,8 +2,9 @@
 
     python benchmarks/monte_carlo.py [RUNS]
 
-The study is ``scenarios/studies/te_monte_carlo.yaml``: one drive with other random tooth surfaces, pitch errors and
-kinematic error in every run, one output turn each way. Both rates are steady: the workers' start is timed apart.
+The study is ``scenarios/studies/te_monte_carlo.yaml``: one drive with other random tooth surfaces, pitch
+errors and kinematic error in every run, one output turn each way. Both rates are steady: the workers' start
+is timed apart.
 """
 
 from __future__ import annotations

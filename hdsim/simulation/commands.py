@@ -61,8 +61,8 @@ def tell(run: Run, duration_s: float) -> None:
     """Print what a run came to."""
     audit, work = run.audit, run.statistics
     click.echo(
-        f"simulated {duration_s:g} s in {work.steps} steps ({work.nfev} right-hand sides); energy audit: residual "
-        f"{audit.residual:.2e} J of {audit.exchanged:.3g} J exchanged ({audit.relative:.1e})"
+        f"simulated {duration_s:g} s in {work.steps} steps ({work.nfev} right-hand sides); energy audit: "
+        f"residual {audit.residual:.2e} J of {audit.exchanged:.3g} J exchanged ({audit.relative:.1e})"
     )
 
 

@@ -293,7 +293,7 @@ class Run:
             )
         if found.suspect is not None:
             return f"Likely cause: {names[found.suspect]} changes faster than the method can follow."
-        return "Likely cause: a parameter outside its law's range, or a tolerance tighter than rounding allows."
+        return "Likely cause: a parameter outside its law's range, or a tolerance finer than rounding allows."
 
     def state_names(self) -> list[str]:
         """Names of the states, in their order in the state vector."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hdsim.drive.model import Model
 from hdsim.simulation.run import Run, SampledLoop

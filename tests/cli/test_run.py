@@ -93,12 +93,25 @@ def test_kill_in_mid_run_leaves_a_log_that_can_be_recovered(tmp_path: Path) -> N
     scenario.write_text(SHORT.format(motor="free", duration=100000, rate=2000))
     partial = tmp_path / "long.mcap.partial"
     process = subprocess.Popen(
-        [sys.executable, "-m", "hdsim.cli", "run", str(scenario), "-o", str(tmp_path / "long.mcap"), "--no-plot"],
+        [
+            sys.executable,
+            "-m",
+            "hdsim.cli",
+            "run",
+            str(scenario),
+            "-o",
+            str(tmp_path / "long.mcap"),
+            "--no-plot",
+        ],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
     deadline = time.monotonic() + 120
-    while process.poll() is None and time.monotonic() < deadline and (not partial.exists() or partial.stat().st_size < 3_000_000):
+    while (
+        process.poll() is None
+        and time.monotonic() < deadline
+        and (not partial.exists() or partial.stat().st_size < 3_000_000)
+    ):
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()

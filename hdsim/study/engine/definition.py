@@ -44,7 +44,9 @@ class Base(Parameters):
 
 
 class ValueList(Parameters):
-    """The values themselves: numbers, text, true/false, null (which turns an effect off) or whole sections."""
+    """The values themselves: numbers, text, true/false, null (which turns an effect off) or
+    whole sections.
+    """
 
     type: Literal["list"]
     values: list[Value | dict[str, Any]] = Field(min_length=1)
@@ -165,7 +167,9 @@ class RandomSampling(Parameters):
 
 
 class LatinHypercube(Parameters):
-    """Every distribution is cut into as many equally likely slices as there are samples; each is used once."""
+    """Every distribution is cut into as many equally likely slices as there are samples; each
+    is used once.
+    """
 
     type: Literal["latin_hypercube"]
     samples: int = Field(ge=1, le=1_000_000)

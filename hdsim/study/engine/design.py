@@ -56,8 +56,8 @@ class RunPoint:
 def runs(study: Study) -> list[RunPoint]:
     """All runs of a study.
 
-    The design is the Cartesian product, slowest first: stated values (the first parameter slowest), samples of
-    all distributions, replicates. Every combination of stated values meets the same samples.
+    The design is the Cartesian product, slowest first: stated values (the first parameter slowest), samples
+    of all distributions, replicates. Every combination of stated values meets the same samples.
     """
     names = list(study.parameters)
     factors = {name: factor_values(variation) for name, variation in study.factors.items()}
@@ -77,7 +77,9 @@ def runs(study: Study) -> list[RunPoint]:
 
 
 def run_seed(study_seed: int, index: int, *, common: bool = False) -> int:
-    """Seed of a run, from the study's seed and the run's index (or the replicate's, when seeds are common)."""
+    """Seed of a run, from the study's seed and the run's index (or the replicate's, when
+    seeds are common).
+    """
     stream = (_SURFACES, index) if common else (index,)
     words = np.random.SeedSequence(study_seed, spawn_key=stream).generate_state(1, np.uint64)
     return int(words[0] >> np.uint64(1))

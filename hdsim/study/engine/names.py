@@ -75,7 +75,8 @@ def check(name: str, data: Any, model: Any) -> None:
         InputError: it has not; the message names the nearest that it has.
     """
     path = parse(name)
-    here, shape = data, shape_of(model)
+    here: Any = data
+    shape: Shape | None = shape_of(model)
     for depth, item in enumerate(path):
         if here is None and depth:
             raise InputError(
@@ -89,7 +90,7 @@ def check(name: str, data: Any, model: Any) -> None:
         )
         if not has and (child is None or isinstance(item, int)):
             raise InputError(f"found an unknown parameter, {_suggestion(name, data, model)}")
-        here, shape = (here[item] if has else None), child  # type: ignore[index]
+        here, shape = (here[item] if has else None), child
     if isinstance(here, list):
         raise InputError(f"found {name!r}, a list of {len(here)}; expected one entry of it, as in {name}[0]")
 
@@ -112,8 +113,8 @@ def _suggestion(name: str, data: Any, model: Any) -> str:
 def set_value(data: dict[str, Any], name: str, value: Any) -> None:
     """Set a field in plain data, in place; missing mappings on the way are made.
 
-    Setting ``type``, ``law``, ``model`` or ``kind`` to another value drops the mapping's other keys, as when a
-    scenario extends another one.
+    Setting ``type``, ``law``, ``model`` or ``kind`` to another value drops the mapping's other keys, as when
+    a scenario extends another one.
     """
     path = parse(name)
     here: Any = data

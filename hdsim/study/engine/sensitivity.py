@@ -35,7 +35,8 @@ class Sensitivity:
         parameter: name of the parameter.
         cost: in the metric's unit. Sobol: standard deviation that goes if the parameter were known,
             sqrt(S_T var). Morris: mean size of the elementary effect over the whole range, mu*.
-        first: Sobol: first-order index S_1; Morris: standard deviation of the effects (interactions, curvature).
+        first: Sobol: first-order index S_1; Morris: standard deviation of the effects (interactions,
+        curvature).
         total: Sobol: total index S_T; Morris: mean of the effects with their sign.
         uncertainty: half-width of the confidence interval of ``total`` (Sobol) or ``cost`` (Morris).
     """

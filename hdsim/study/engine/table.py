@@ -162,7 +162,9 @@ def _uniform(values: list[Any]) -> list[Any]:
 
 
 def provenance(plan: Plan) -> dict[str, str]:
-    """What made the results: the study, its base, seeds, versions; nothing that changes between two machines."""
+    """What made the results: the study, its base, seeds, versions; nothing that changes
+    between two machines.
+    """
     from importlib.metadata import version
 
     from hdsim.study.engine.journal import code_version, key_of

@@ -104,9 +104,9 @@ def find_tolerance(
 ) -> Tolerance:
     """The extreme value of a parameter at which a share of all drives still meets a limit.
 
-    Every value is tried on the same drives (common random numbers), so that the metric is a smooth function of the
-    parameter for each and the bisection does not chase noise. The metric has to rise or fall with the parameter
-    over the range; the found value lies next to the end that meets the limit.
+    Every value is tried on the same drives (common random numbers), so that the metric is a smooth function
+    of the parameter for each and the bisection does not chase noise. The metric has to rise or fall with the
+    parameter over the range; the found value lies next to the end that meets the limit.
 
     Args:
         scenario: the base.
@@ -135,8 +135,8 @@ def find_tolerance(
         raise InputError(f"{parameter} is {now!r} in the scenario: give the range with --low and --high")
     if now is None and (low is None or high is None):
         raise InputError(f"{parameter} has no value in the scenario: give the range with --low and --high")
-    low = float(now) / 100 if low is None else low
-    high = float(now) * 100 if high is None else high
+    low = float(now or 0.0) / 100 if low is None else low
+    high = float(now or 0.0) * 100 if high is None else high
     if not low < high:
         raise InputError(f"the range must rise, found {low:g} to {high:g}")
     # A study of the two ends checks names, types and bounds with the messages of any study.
