@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from hdsim.surface.backlash import single_frequency_half_gap, sliding_half_gaps, tooth_half_gaps
     from hdsim.surface.files import read_heights
     from hdsim.surface.flank import Flank, equivalent_surface, structure_function, structure_function_constant
-    from hdsim.surface.identify import identify
     from hdsim.surface.profile import random_phases, wm_profile
 
 _HOME = {
