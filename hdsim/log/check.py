@@ -12,7 +12,7 @@ import numpy as np
 from mcap import records
 from mcap.opcode import Opcode
 
-from hdsim.log import naming, scan, schemas
+from hdsim.log import joint_states, naming, scan, schemas
 from hdsim.log.reader import double_fields
 from hdsim.log.rows import HEAD, DoubleField, RowLayout
 
@@ -109,11 +109,18 @@ class _MessageCheck:
         self._json = channel.message_encoding == "json"
         self._fields: list[DoubleField] | None = None
         self._class: Any = None
+        self._joints = False
         self.reason: str | None = None
         if channel.message_encoding == "protobuf" and schema is not None:
             self._class = schemas.message_class(schema.name, schema.data)
             fields = double_fields(schema)
             self._fields = None if fields is None else [f for _, f in fields]
+        elif (
+            channel.message_encoding == "cdr"
+            and schema is not None
+            and schema.name == joint_states.MESSAGE_TYPE
+        ):
+            self._joints = True
         elif not self._json:
             self.reason = f"topic {channel.topic}: encoding {channel.message_encoding!r} is not checked here"
 
@@ -126,11 +133,15 @@ class _MessageCheck:
             # All tags and lengths are right, and all else is doubles: nothing is left that could not parse.
             if layout is not None and layout.matches(whole.reshape(run.count, run.size)):
                 run = scan.Run(run.opcode, run.start, run.size, 1)
-        if self._class is None and not self._json:
+        if self._class is None and not self._json and not self._joints:
             return None
         for index, body in enumerate(scan.message_bodies(data, run)):
             try:
-                if self._json:
+                if self._joints:
+                    wrong = joint_states.problem_of(bytes(body))
+                    if wrong:
+                        return f"message {index} of a run does not parse: {wrong}"
+                elif self._json:
                     json.loads(body, parse_constant=_refuse)
                 else:
                     self._class.FromString(body)

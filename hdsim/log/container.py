@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import zlib
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import IO, Any, Literal, Protocol
 
@@ -62,15 +62,23 @@ class MessageIndexes:
         self.by_channel[channel] = entries
 
 
+Watch = Callable[[records.Schema, records.Channel, list[int], list[bytes]], None]
+"""Sees messages as they are written: schema, channel, log times (ns) and bodies."""
+
+
 class Container:
     """An MCAP file being written to a binary stream.
 
     Schemas and channels are numbered when asked for, but counted and repeated in the summary only once a
     chunk brings them: a channel without messages is an error to strict readers.
+
+    Attributes:
+        watch: sees every message as soon as it is known, before its chunk is full.
     """
 
     def __init__(self, stream: IO[bytes], compression: Literal["zstd", "none"] = "zstd") -> None:
         self._stream = stream
+        self.watch: Watch | None = None
         self._position = 0
         self._crc = 0
         self._compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL) if compression == "zstd" else None

@@ -24,7 +24,7 @@ def double_field(number: int, value: float) -> bytes:
     return DoubleField(number, repeated=False).tag + struct.pack("<d", value)
 
 
-class _Stream:
+class Stream:
     """What all topics share. Each chunk repeats schema and channel, so that it can be read alone."""
 
     def __init__(
@@ -34,14 +34,22 @@ class _Stream:
         topic: str,
         schema: records.Schema,
         metadata: dict[str, str],
+        *,
+        encoding: str = _ENCODING,
     ) -> None:
         self._container = container
         self._schema = schema
         self._channel = records.Channel(
-            id=channel, topic=topic, message_encoding=_ENCODING, schema_id=schema.id, metadata=metadata
+            id=channel, topic=topic, message_encoding=encoding, schema_id=schema.id, metadata=metadata
         )
         self._preamble = encode(schema) + encode(self._channel)
         self._sequence = 0
+
+    def _tell(self, log_times: NDArray[Any], records: NDArray[np.uint8], head: int) -> None:
+        """Hand the bodies of whole Message records, shape (n, record size), to whoever watches the log."""
+        watch = self._container.watch
+        if watch is not None:
+            watch(self._schema, self._channel, log_times.tolist(), [r[head:].tobytes() for r in records])
 
     def _write(self, data: bytes | memoryview, log_times: NDArray[Any], offsets: NDArray[Any]) -> None:
         indexes = MessageIndexes()
@@ -49,7 +57,7 @@ class _Stream:
         self._container.chunk(data, indexes, [self._schema], [self._channel])
 
 
-class TableStream(_Stream):
+class TableStream(Stream):
     """Rows of doubles, laid out as whole Message records in a buffer of one chunk.
 
     Args:
@@ -146,6 +154,8 @@ class TableStream(_Stream):
             rows[f"f{index}"] = column
         if time is not None and n:
             self.last_time = float(time[-1])
+        if self._container.watch is not None:
+            self._tell(log_times, rows.view(np.uint8).reshape(n, -1), HEAD.size)
         self._sequence += n
         self._filled += n
         if self.room:
@@ -163,7 +173,7 @@ class TableStream(_Stream):
         self._filled = 0
 
 
-class MessageStream(_Stream):
+class MessageStream(Stream):
     """Protobuf messages of any type and length."""
 
     def __init__(
@@ -190,6 +200,8 @@ class MessageStream(_Stream):
         )
         self._data += payload
         self._sequence += 1
+        if self._container.watch is not None:
+            self._container.watch(self._schema, self._channel, [log_time], [payload])
         if len(self._data) >= CHUNK_SIZE:
             self.flush()
 

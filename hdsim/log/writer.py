@@ -12,7 +12,8 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.log import naming
-from hdsim.log.container import Container
+from hdsim.log.container import Container, Watch
+from hdsim.log.joint_states import MESSAGE_TYPE, JointStateStream, has_joints
 from hdsim.log.streams import MessageStream, TableStream
 from hdsim.log.view import MinMaxView
 from hdsim.log.viewing import LoopStream, ViewStream, display_columns, scaled
@@ -28,6 +29,7 @@ VIEW_SAMPLES = 20_000
 
 DEFAULT_VIEW_RATE_HZ = 1000.0
 
+_JOINT_TABLES = ("state", "measured")
 _LEVELS = {"info": 2, "warning": 3, "error": 4}
 _MEDIA_TYPES = {".yaml": "application/yaml", ".yml": "application/yaml", ".json": "application/json"}
 
@@ -53,6 +55,7 @@ class LogWriter:
         view_rate_hz: samples a second in the decimated twin of the state; `view_rate` gives one that suits
             a run's length. Infinite keeps every sample.
         compression: of the chunks.
+        watch: sees every message as it is written, for who shows the run while it goes on.
         layouts: attach the viewer's layouts that fit the log when it is closed.
 
     Attributes:
@@ -71,6 +74,7 @@ class LogWriter:
         view_rate_hz: float = DEFAULT_VIEW_RATE_HZ,
         compression: Literal["zstd", "none"] = "zstd",
         layouts: bool = True,
+        watch: Watch | None = None,
     ) -> None:
         self.path = Path(path)
         self.partial = self.path.with_name(self.path.name + ".partial")
@@ -92,10 +96,13 @@ class LogWriter:
         self._channels = 0
         self._tables: dict[str, TableStream] = {}
         self._messages: dict[str, MessageStream] = {}
+        self._joints: JointStateStream | None = None
+        self._joint_table = ""
         self._schemas: dict[str, int] = {}
         self._last_event_ns = 0
         self._open = True
         self._container = Container(self._file, compression)
+        self._container.watch = watch
         self._container.metadata(naming.RUN_RECORD, metadata)
         for name, content in (attachments or {}).items():
             data = content.encode() if isinstance(content, str) else content
@@ -167,6 +174,7 @@ class LogWriter:
         columns = [np.asarray(c.values, np.float64) for c in block.columns.values()]
         stream.check(name, time, specs, columns)
         log_times = naming.to_ns(time)
+        with_joints = name in _JOINT_TABLES and has_joints(list(block.columns))
         # The view is fed chunk by chunk, so that the file doesn't depend on how the run was cut in blocks.
         begin = 0
         while begin < len(time):
@@ -176,9 +184,21 @@ class LogWriter:
             full = stream.append(time[rows], log_times[rows], piece)
             if name in self._views:
                 self._views[name].feed(time[rows], piece)
+            if with_joints:
+                self._write_joints(name, time[rows], dict(zip(block.columns, piece, strict=True)))
             if full:
                 self._flush_messages()
             begin = end
+
+    def _write_joints(self, table: str, time: Array, columns: Mapping[str, Array]) -> None:
+        """Joint states of a table, unless another one has that topic already."""
+        if self._joints is None:
+            schema_id = self._schemas.setdefault(MESSAGE_TYPE, len(self._schemas) + 1)
+            channel = self._next_channel()
+            self._joints = JointStateStream(self._container, channel, schema_id, self._view_rate)
+            self._joint_table = table
+        if self._joint_table == table:
+            self._joints.feed(time, columns)
 
     def write_event(self, event: Event) -> None:
         """Write an event; it reaches the disk with the next chunk.
@@ -248,6 +268,8 @@ class LogWriter:
             stream.flush()
         for view in self._views.values():
             view.flush()
+        if self._joints is not None:
+            self._joints.flush()
         self._flush_messages()
         self._container.flush()
 
@@ -344,6 +366,8 @@ class LogWriter:
                 stream.flush()
             for view in self._views.values():
                 view.finish()
+            if self._joints is not None:
+                self._joints.flush()
             self._flush_messages()
             self._attach_layouts()
             if statistics:

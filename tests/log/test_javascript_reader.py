@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driving import drive_run
 
 from hdsim.log import write_log
 from hdsim.recording import Column, Recording, Table
@@ -72,6 +73,7 @@ def test_javascript_reads_every_message_to_the_bit(reader, recording, tmp_path):
     assert sum(counts.values()) == found["messages"]
     views = counts.pop("/hd/state_view")
     assert 19_000 < views <= 20_002
+    assert 18_000 < counts.pop("/joint_states") <= 20_001
     assert counts == {
         "/hd/state": 30_000,
         "/hd/teeth": 300,
@@ -87,10 +89,23 @@ def test_javascript_reads_every_message_to_the_bit(reader, recording, tmp_path):
     assert state["sha256"]["motor_angle"] == sha256(recording["motor_angle"])
     assert state["sha256"]["output_torque"] == sha256(recording["output torque"])
     assert teeth["sha256"]["normal_force"] == sha256(recording.tables["teeth"]["normal_force"])
+    joints = found["topics"]["/joint_states"]
+    assert joints["schema"] == "sensor_msgs/msg/JointState"
     assert found["topics"]["/hd/events"]["schema"] == "foxglove.Log"
     assert found["topics"]["/hd/events"]["sha256"]["time"] == sha256(
         np.array([e.time for e in recording.events])
     )
+
+
+def test_javascript_reads_the_joint_states_to_the_bit(reader, tmp_path):
+    run = drive_run()
+    done = read(reader, write_log(run, tmp_path / "a.mcap"))
+    assert done.returncode == 0, done.stderr
+    joints = json.loads(done.stdout)["topics"]["/joint_states"]
+    assert joints["indexed"] == len(run.time)
+    for field, channel in (("position", "angle"), ("velocity", "velocity"), ("effort", "torque")):
+        both = np.column_stack([run[f"motor_{channel}"], run[f"output_{channel}"]])
+        assert joints["sha256"][field] == sha256(both)
 
 
 def test_javascript_refuses_a_flipped_byte(reader, tmp_path):

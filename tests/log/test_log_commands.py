@@ -27,7 +27,7 @@ def test_info_lists_topics_columns_units_and_metadata(log):
         assert text in done.output
     for text in ("Radau, rtol 1e-6", "scenario.yaml", "3 x 4", "200"):
         assert text in done.output
-    assert "joint" not in invoke(commands.info, log, "--no-columns").output
+    assert "joint — torque" not in invoke(commands.info, log, "--no-columns").output
 
 
 def test_csv_brings_back_every_bit(log, recording, tmp_path):

@@ -5,6 +5,8 @@ import { open, readFile } from "node:fs/promises";
 
 import { crc32 } from "@foxglove/crc";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
+import { parse } from "@foxglove/rosmsg";
+import { MessageReader } from "@foxglove/rosmsg2-serialization";
 import { loadDecompressHandlers, protobufFromBinaryDescriptor } from "@mcap/support";
 
 const path = process.argv[2];
@@ -14,18 +16,35 @@ function fail(text) {
   throw new Error(text);
 }
 
+class JointStates {
+  constructor(schema) {
+    this.reader = new MessageReader(parse(new TextDecoder().decode(schema.data), { ros2: true }));
+    this.fields = ["position", "velocity", "effort"].map((name) => ({ name, repeated: true }));
+  }
+
+  decode(data) {
+    return this.reader.readMessage(data);
+  }
+}
+
 class Topic {
   constructor(channel, schema) {
+    this.schema = schema.name;
+    this.indexed = 0;
+    this.streamed = 0;
+    this.last = -1n;
+    if (channel.messageEncoding === "cdr" && schema.encoding === "ros2msg") {
+      this.type = new JointStates(schema);
+      this.fields = this.type.fields;
+      this.hashes = new Map(this.fields.map((field) => [field.name, createHash("sha256")]));
+      return;
+    }
     if (channel.messageEncoding !== "protobuf" || schema.encoding !== "protobuf") {
       fail(`${channel.topic} is not protobuf`);
     }
     this.type = protobufFromBinaryDescriptor(schema.data).lookupType(schema.name);
     this.fields = this.type.fieldsArray.filter((field) => field.type === "double");
     this.hashes = new Map(this.fields.map((field) => [field.name, createHash("sha256")]));
-    this.schema = schema.name;
-    this.indexed = 0;
-    this.streamed = 0;
-    this.last = -1n;
   }
 
   take(message) {
