@@ -126,10 +126,11 @@ def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, A
     """
     from hdsim.drive.presets import catalogue_figures, preset_names
     from hdsim.errors import InputError
-    from hdsim.study.bench.report import DEFAULT_EFFECTS, catalogue_lines
+    from hdsim.study.bench.report import catalogue_lines, default_effects
 
     if given in preset_names():
-        return given, {"preset": given}, dict(DEFAULT_EFFECTS), {}, catalogue_lines(catalogue_figures(given))
+        section = {"preset": given}
+        return given, section, default_effects(section), {}, catalogue_lines(catalogue_figures(given))
     path = Path(given)
     if not path.exists():
         try:

@@ -12,7 +12,7 @@ from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
 from hdsim.simulation.simulate import simulate
 from hdsim.study.bench import frequency, friction, positioning, settling, torsion, transmission
-from hdsim.study.bench.report import DEFAULT_EFFECTS, catalogue_lines, figures_of, run_procedure
+from hdsim.study.bench.report import catalogue_lines, default_effects, figures_of, run_procedure
 from hdsim.study.commands import bench, presets
 from hdsim.study.metrics.friction import operating_points
 from hdsim.study.metrics.positioning import approaches, positioning_errors
@@ -34,7 +34,7 @@ def test_the_default_drive_is_inside_the_catalogues_lines() -> None:
     found = {}
     for name in ("transmission_error", "torsion", "repeatability"):
         procedure = find_procedure(name)
-        runs = run_procedure(procedure, SEED, effects=DEFAULT_EFFECTS, options=options.get(name))
+        runs = run_procedure(procedure, SEED, effects=default_effects(SEED), options=options.get(name))
         found |= {row.metric: row for row in figures_of(procedure, runs, lines) if row.line is not None}
     assert set(found) == {
         "transmission_accuracy",
@@ -55,6 +55,27 @@ def test_the_default_drive_is_inside_the_catalogues_lines() -> None:
     # Not empty lines either: the default effects use most of what the catalogue allows.
     assert found["transmission_accuracy"].value > 30
     assert found["hysteresis_loss"].value > 40
+
+
+def test_the_hysteresis_of_every_size_is_inside_and_uses_its_line() -> None:
+    procedure = find_procedure("torsion")
+    for preset in ("csg-14-50", "csg-17-100", "csg-25-160"):
+        drive = {"preset": preset, "mesh": {"model": "lumped"}}
+        runs = run_procedure(procedure, drive, effects=default_effects(drive), options={"period_s": 8.0})
+        rows = {
+            row.metric: row for row in figures_of(procedure, runs, catalogue_lines(catalogue_figures(preset)))
+        }
+        assert 40 < rows["hysteresis_loss"].value < 60
+        assert all(
+            rows[name].holds for name in ("lost_motion", "stiffness_k1", "stiffness_k2", "stiffness_k3")
+        )
+
+
+def test_the_seed_drives_default_hysteresis_is_the_effects_own() -> None:
+    from hdsim.effects.torsional_hysteresis_maxwell import TorsionalHysteresisMaxwell
+
+    found = default_effects(SEED)["torsional_hysteresis_maxwell"]["slip_torque_nm"]
+    assert found == pytest.approx(TorsionalHysteresisMaxwell().slip_torque_nm)
 
 
 def test_a_worse_drive_is_outside() -> None:
@@ -235,7 +256,9 @@ def test_every_procedure_draws_a_labelled_picture() -> None:
     for name, procedure in procedures().items():
         assert set(procedure.metrics) <= set(metrics())
         variants = [dict(variant) for variant in procedure.variants]
-        scenarios = [procedure.build(LUMPED, effects=DEFAULT_EFFECTS, **(short[name] | v)) for v in variants]
+        scenarios = [
+            procedure.build(LUMPED, effects=default_effects(SEED), **(short[name] | v)) for v in variants
+        ]
         runs = [BenchRun(v, s, simulate(s)) for v, s in zip(variants, scenarios, strict=True)]
         figure = procedure.plot(runs)
         figure.draw_without_rendering()

@@ -38,7 +38,7 @@ def build(
         drive: section ``drive``.
         effects: section ``effects``.
         run: fields of ``run`` that win.
-        amplitude_nm: T; rated torque when left out, or a fifth more than T2 where that is larger.
+        amplitude_nm: T; rated torque when left out, or 1.5 T2 where that is larger.
         period_s: of the cycle, slow against inertia and damping. On a real bench the loop also depends on the
             rate of loading, which rate-independent hysteresis leaves out.
         load_inertia_kg_m2: inertia of the lever.
@@ -46,7 +46,7 @@ def build(
             the torque crosses zero through the play. The effects' own ``load_side_friction`` wins.
     """
     made = Drive.model_validate(dict(drive))
-    amplitude = amplitude_nm or max(made.rated_torque_nm, 1.2 * made.torsion.torque_t2_nm)
+    amplitude = amplitude_nm or max(made.rated_torque_nm, 1.5 * made.torsion.torque_t2_nm)
     torque = {"type": "triangle", "amplitude_nm": amplitude, "frequency_hz": 1.0 / period_s}
     return bench(
         drive,
