@@ -21,6 +21,7 @@ from typing import Any
 
 from numba import njit
 
+from hdsim.drive._window import lobe_potential
 from hdsim.kernel import mesh
 
 # Result of a mesh kernel.
@@ -60,6 +61,7 @@ TABLE_ANGLE_NODES = 23
 TABLE_AT = 24
 TABLE_TWIST_START = 25
 SMOOTHING = 26  # half-width of the dead-zone's rounded corners, m
+CONSTANT_GAPS_AT = 27  # constant half-gaps of the teeth, twice over as the pitch errors; 0: none
 HEADER = 28
 
 _jit: Any = njit(cache=True, nogil=True, error_model="numpy")
@@ -69,8 +71,9 @@ _inline: Any = njit(cache=True, nogil=True, error_model="numpy", inline="always"
 @_inline
 def hermite(p, at, step, cells, x):  # type: ignore[no-untyped-def]
     """Energy, force and stiffness at x >= 0 from a table of quartic cells; linear force beyond the end."""
-    cell = int(x / step)
     last = int(cells) - 1
+    # The lower bound catches what the conversion makes of a number that is not finite.
+    cell = max(int(x / step), 0)
     if cell > last:
         base = at + 5 * last
         s = step
@@ -150,11 +153,50 @@ def contact_border(p, x):  # type: ignore[no-untyped-def]
 
 
 @_jit
+def window_potential(p, x, angle):  # type: ignore[no-untyped-def]
+    """``teeth_potential`` for a window, constant gaps and sharp corners: the two arcs, each in one sweep."""
+    teeth = int(p[TEETH])
+    pitch = 2.0 * math.pi / teeth
+    border = p[BORDER]
+    v = v_x = v_xx = v_a = v_aa = v_xa = engaged = 0.0
+    for lobe in range(2):
+        origin = angle - lobe * math.pi
+        first = math.ceil((-border - origin) / pitch)
+        last = math.floor((border - origin) / pitch)
+        tooth = first % teeth
+        part = lobe_potential(
+            p,
+            x,
+            int(p[CONSTANT_GAPS_AT]) + tooth,
+            int(p[PITCH_ERROR_AT]) + tooth,
+            min(last - first + 1, teeth),
+            first * pitch + origin,
+            pitch,
+            p[PLATEAU],
+            border,
+            p[EXTRA_GAP],
+            int(p[CONTACT_AT]),
+            p[CONTACT_STEP],
+            int(p[CONTACT_CELLS]),
+        )
+        v += part[0]
+        v_x += part[1]
+        v_xx += part[2]
+        v_a += part[3]
+        v_aa += part[4]
+        v_xa += part[5]
+        engaged += part[6]
+    return v, v_x, v_xx, v_a, v_aa, v_xa, engaged
+
+
+@_jit
 def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
     """Sum over the teeth at common displacement x and ring angle a from the major axis.
 
     Returns V, V_x, V_xx, V_a, V_aa, V_xa and the number of teeth that carry load.
     """
+    if p[CONSTANT_GAPS_AT] > 0.0:
+        return window_potential(p, x, angle)
     teeth = int(p[TEETH])
     pitch = 2.0 * math.pi / teeth
     clearing = p[KIND] != 0.0
@@ -233,7 +275,7 @@ def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
 
 @_jit
 def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
-    """Every tooth's normal force (N, signed by flank) and angle from the major axis (rad, within a half turn)."""
+    """Every tooth's normal force (N, signed by flank) and angle from the major axis (rad, +- half a turn)."""
     teeth = int(p[TEETH])
     pitch = 2.0 * math.pi / teeth
     cells = int(p[GAP_CELLS])
@@ -265,7 +307,7 @@ def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
 
 @_jit
 def table_potential(p, x, angle):  # type: ignore[no-untyped-def]
-    """``teeth_potential`` from a bicubic spline of V over displacement and angle (period pi), linear beyond."""
+    """``teeth_potential`` from a bicubic spline of V over displacement and angle; linear beyond."""
     step = p[TABLE_TWIST_STEP]
     rows = int(p[TABLE_TWIST_NODES])
     columns = int(p[TABLE_ANGLE_NODES])

@@ -200,7 +200,8 @@ class Teeth:
         return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
 
     def close_gaps(self, numbers: Array) -> None:
-        """Close the surfaces' gaps in a built mesh; the structure keeps the stiffness that it was calibrated to.
+        """Close the surfaces' gaps in a built mesh; the structure keeps the stiffness that it was calibrated
+        to.
 
         Args:
             numbers: the compiled mesh's numbers, changed in place. The potential of a tabulated mesh is not.
@@ -229,22 +230,33 @@ class Teeth:
         """Mesh twist (rad, at the ring) and engaged share at a mean mesh torque (N m)."""
         from scipy.optimize import brentq
 
-        high = 1e-5
+        low, high = 0.0, 1e-5
         while self.torque(high)[0] < torque_nm:
             high *= 2
             if high > 1.0:
                 raise PhysicsError(f"the mesh does not reach {torque_nm:g} N m at a twist of {high:g} rad")
-        twist = float(brentq(lambda angle: self.torque(angle)[0] - torque_nm, 0.0, high, xtol=1e-13))
+        # Pitch errors press teeth against each other even at no twist.
+        while self.torque(low)[0] > torque_nm:
+            low = min(-1e-5, 2 * low)
+            if low < -1.0:
+                raise PhysicsError(f"the mesh does not reach {torque_nm:g} N m at a twist of {low:g} rad")
+        twist = float(brentq(lambda angle: self.torque(angle)[0] - torque_nm, low, high, xtol=1e-13))
         return twist, self.torque(twist)[1]
+
+    def wind_up(self, torque_nm: float) -> float:
+        """Twist (rad) of the mesh by a torque (N m), both at the output; with pitch errors half of that between
+        plus and minus the torque, because they also shift its zero.
+        """
+        twist = self.loaded(torque_nm / self.scale)[0]
+        if self._header[_mesh.LARGEST_PITCH_ERROR] > 0.0:
+            twist = 0.5 * (twist - self.loaded(-torque_nm / self.scale)[0])
+        return twist / self.scale
 
     def _place_structure(self, wind_ups: Sequence[Callable[[Array], Array]]) -> None:
         torsion = self.drive.torsion
         rated = self.drive.rated_torque_nm
 
-        def mesh_wind_up(torque: float) -> float:
-            return self.loaded(torque / self.scale)[0] / self.scale
-
-        self.structure_wind_up = spring.structure_wind_up(torsion, rated, mesh_wind_up)
+        self.structure_wind_up = spring.structure_wind_up(torsion, rated, self.wind_up)
         step, cells = spring.spring_cells(
             [self.structure_wind_up, *wind_ups],
             [torsion.torque_t1_nm, torsion.torque_t2_nm, rated],
@@ -301,7 +313,7 @@ class Teeth:
         """Compliance budget at rated torque: share of the wind-up in contact and gap, bending, structure."""
         rated = self.drive.rated_torque_nm
         total = float(spring.catalogue_wind_up(self.drive.torsion, np.array(rated)))
-        mesh = self.loaded(rated / self.scale)[0] / self.scale
+        mesh = self.wind_up(rated)
         bending = self.mesh.tooth_bending_stiffness_n_per_m
         bent = 0.0 if bending is None else self.rated_tooth_force_n / bending / self.lever_m / self.scale
         wave_generator = self.drive.torsion.wave_generator_stiffness_nm_per_rad
