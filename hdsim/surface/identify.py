@@ -25,7 +25,8 @@ Detrend = Literal["none", "mean", "line"]
 
 #: Two-sided 95 % point of the normal distribution.
 _Z95 = 1.959963984540054
-#: Surrogates are drawn at the estimate, not at the truth: their spread alone covers 93 % instead of 95 %.
+#: Surrogates are drawn at the estimate, not at the truth, so their spread alone is a little small: measured on
+#: 250 seeds a case it covered 88 % (noise fitted) to 94 % (clean), with this factor 92 % to 97 %.
 _WIDENING = 1.1
 
 
