@@ -80,9 +80,10 @@ def plot(runs: Sequence[BenchRun]) -> Figure:
     ) as figure:
         over, spectrum = figure.subplots(2, 1, height_ratios=[1.1, 1.0])
         for one, colour, name in ((forward, style.BLUE, "forward"), (backward, style.ORANGE, "backward")):
-            angle = np.degrees(one.motor_angle / one.ratio)
+            angle = np.degrees(one.motor_angle / one.ratio) % 360.0
+            order = np.argsort(angle)
             shown = ARCSEC * (one.error + one.mean)
-            over.plot(angle - angle.min(), shown, color=colour, linewidth=0.7, label=name)
+            over.plot(angle[order], shown[order], color=colour, linewidth=0.7, label=name)
         zero_lines(over, vertical=False)
         over.set(xlim=(0.0, 360.0), xlabel="output angle (deg)", ylabel="transmission error (arcsec)")
         over.set_xticks(range(0, 361, 30))
