@@ -6,9 +6,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hdsim.plot.bode import plot_bode as plot_bode
     from hdsim.plot.page import plot_recording as plot_recording
 
-_HOME = {"plot_recording": "page"}
+_HOME = {"plot_bode": "bode", "plot_recording": "page"}
 
 __all__ = sorted(_HOME)
 

@@ -23,8 +23,8 @@ def plot(log: Path, output: Path | None) -> None:
     save_figure(hdsim.open_log(log).plot(), picture)
 
 
-def save_figure(figure: object, path: Path) -> None:
-    """Write a figure and say where it went.
+def save_figure(figure: object, path: Path, *, quiet: bool = False) -> None:
+    """Write a figure and, unless quiet, say where it went.
 
     Raises:
         InputError: the file cannot be written, or its ending names no format that matplotlib writes.
@@ -36,4 +36,5 @@ def save_figure(figure: object, path: Path) -> None:
         figure.savefig(path)  # type: ignore[attr-defined]
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: the picture cannot be written ({error})") from error
-    click.echo(f"picture  {path}")
+    if not quiet:
+        click.echo(f"picture  {path}")
