@@ -24,6 +24,9 @@ DRAWN = ("motor_velocity", "output_velocity", "output_torque")
 #: Damping ratio above which a mode shows no peak and is not marked.
 _PEAKLESS = 0.7
 
+#: Share of the largest response to an output below which a curve is rounding.
+ROUNDING = 1e-9
+
 #: Units of the inputs of open and closed loops.
 _INPUT_UNITS = {
     "motor_torque": "N m",
@@ -83,6 +86,9 @@ def plot_bode(
             row = list(system.output_labels).index(output)
             for name, colour in zip(drawn_inputs, _COLOURS, strict=False):
                 at = list(system.input_labels).index(name)
+                if not np.max(response.magnitude[row, at]) > ROUNDING * np.max(response.magnitude[row]):
+                    # Not connected, as motor and output across the backlash: the curve is rounding.
+                    continue
                 unit = f"{OUTPUT_UNITS.get(output, '1')} / {_INPUT_UNITS.get(name, '1')}"
                 label = f"from {name.replace('_', ' ')}, ({unit.replace(' / ', ') / (')})"
                 upper.loglog(frequencies, response.magnitude[row, at], color=colour, label=label)

@@ -337,6 +337,20 @@ def test_the_bode_plot_marks_the_resonance_and_unwraps_the_phase():
         frequency_grid([], (10.0, 1.0))
 
 
+def test_a_connection_that_is_only_rounding_is_not_drawn():
+    system = ct.ss(
+        [[-1.0, 0], [0, -2.0]],
+        np.eye(2),
+        [[1.0, 1e-13]],
+        0,
+        inputs=["motor_torque", "load_torque"],
+        outputs=["motor_velocity"],
+    )
+    figure = plot_bode(system, range_hz=(1.0, 10.0))
+    assert len(figure.axes[0].lines) == len(figure.axes[1].lines) == 1
+    assert [text.get_text()[:17] for text in figure.axes[0].get_legend().get_texts()] == ["from motor torque"]
+
+
 def test_the_command_prints_modes_and_draws(tmp_path):
     path = tmp_path / "one.yaml"
     path.write_text(scenario().to_yaml())
