@@ -157,4 +157,7 @@ def _every_45(axes: Any) -> Any:
     from matplotlib.ticker import MultipleLocator
 
     low, high = axes.get_ylim()
+    # Whole steps, so that a phase that hardly changes looks like one.
+    low, high = 45.0 * np.floor(low / 45.0), 45.0 * np.ceil(high / 45.0)
+    axes.set_ylim(low, high)
     return MultipleLocator(45.0 if high - low < 400.0 else 90.0)
