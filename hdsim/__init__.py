@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hdsim.log import open_log
+    from hdsim.log.importing import import_recording
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
     from hdsim.simulation.linear import io_system, linearize
@@ -29,6 +30,7 @@ __all__ = [
     "PhysicsError",
     "Recording",
     "Scenario",
+    "import_recording",
     "io_system",
     "linearize",
     "load_scenario",
@@ -40,6 +42,7 @@ __all__ = [
 _HOMES = {
     "Recording": "hdsim.recording",
     "Scenario": "hdsim.scenario",
+    "import_recording": "hdsim.log.importing",
     "io_system": "hdsim.simulation.linear",
     "linearize": "hdsim.simulation.linear",
     "open_log": "hdsim.log",

@@ -19,6 +19,7 @@ from hdsim.errors import InputError
 
 STATE = "/hd/state_view"
 TEETH = "/hd/teeth"
+MEASURED = "/hd/measured_view"
 LOOP = "/hd/state_loop"
 STATIC = "/hd/static_view"
 EVENTS = "/hd/events"
@@ -325,6 +326,8 @@ def build_layout(
     except KeyError:
         raise InputError(f"no layout {name!r}; there are: {', '.join(LAYOUTS)}") from None
     if topics is not None:
+        if STATE not in topics and MEASURED in topics:
+            tree = _of_measured(tree)
         tree = _prune(tree, topics)
     if tree is None or all(panel.kind == "RosOut" for panel in _panels(tree)):
         raise InputError(f"the log has no topic that layout {name!r} shows")
@@ -388,6 +391,21 @@ def _nest(tree: Panel | Split) -> Any:
 def _has(path: str, topics: Topics) -> bool:
     topic, field = split_path(path)
     return topic in topics and (not field or field in topics[topic])
+
+
+def _of_measured(tree: Panel | Split | None) -> Panel | Split | None:
+    """The same panels on a measured run, for a log that has no simulated one."""
+    if isinstance(tree, Split):
+        parts = ((share, _of_measured(part)) for share, part in tree.parts)
+        return Split(tree.direction, tuple((share, part) for share, part in parts if part is not None))
+    if tree is None:
+        return None
+
+    def moved(text: str) -> str:
+        return text.replace("/hd/state_", "/hd/measured_")
+
+    settings = json.loads(moved(json.dumps(tree.settings)))
+    return Panel(tree.kind, tree.title, settings, tuple(moved(path) for path in tree.paths))
 
 
 def _prune(tree: Panel | Split | None, topics: Topics) -> Panel | Split | None:

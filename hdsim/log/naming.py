@@ -32,6 +32,9 @@ VIEW_SUFFIX = "_view"
 LOOP_SUFFIX = "_loop"
 VIEWED_TABLES = ("state", "measured", "before", "after")
 """Tables that viewers plot: runs, alone or held against each other."""
+ORIGIN_KEY = "recorded"
+MEASURED = "measured"
+"""Metadata ``recorded: measured``: the state of that recording is the table ``measured`` of its log."""
 PROTOBUF_PACKAGE = "hdsim"
 
 RUN_RECORD = "hdsim.run"

@@ -234,6 +234,9 @@ class _Contents:
                 recording.static = dict(_static_columns(specs, arrays))
             else:
                 recording.tables[name] = _table(specs, arrays)
+        measured = self.metadata.get(naming.ORIGIN_KEY) == naming.MEASURED
+        if measured and naming.MEASURED in recording.tables and "state" not in recording.tables:
+            recording.tables["state"] = recording.tables.pop(naming.MEASURED)
         return recording
 
 

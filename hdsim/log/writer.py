@@ -402,6 +402,7 @@ def write_log(
     files = dict(attachments or {})
     if "scenario" in recording.metadata:
         files.setdefault("scenario.yaml", recording.metadata["scenario"])
+    measured = recording.metadata.get(naming.ORIGIN_KEY) == naming.MEASURED
     longest = max((recording.tables.get(name, Table(np.zeros(0))) for name in naming.VIEWED_TABLES), key=len)
     rate = np.inf
     if len(longest) > VIEW_SAMPLES:
@@ -411,7 +412,7 @@ def write_log(
         for event in recording.events:
             log.write_event(event)
         for name, table in recording.tables.items():
-            log.write(name, table)
+            log.write(naming.MEASURED if measured and name == "state" else name, table)
         if scene:
             from hdsim.log.scene import write_scene
 

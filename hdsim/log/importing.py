@@ -1,0 +1,317 @@
+"""Other people's recordings as ours: mapped, in SI units, on the right side of the gear, one time axis."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.errors import InputError
+from hdsim.log import foreign, naming
+from hdsim.log.mapping import (
+    TIME_UNITS,
+    AngleChannel,
+    Channels,
+    IntervalMask,
+    Mapping,
+    Origin,
+    OutlierMask,
+    TorqueChannel,
+    _Channel,
+    side_of,
+)
+from hdsim.recording import Column, Event, Recording, Table
+
+Array = NDArray[np.float64]
+
+UNITS = {"angle": "rad", "velocity": "rad/s", "torque": "N m", "temperature": "degC"}
+_TOLD_GAPS = 50
+
+
+def import_recording(path: str | Path, mapping: str | Path | Mapping | None = None) -> Recording:
+    """Read a measured recording into the names and units of our own.
+
+    Args:
+        path: a CSV, Parquet or MCAP file, or a ROS 2 bag (its folder).
+        mapping: a mapping file, or a mapping; None for a log of hdsim, which needs none.
+
+    Returns:
+        A recording whose ``state`` holds what was measured: ``motor_angle``, ``motor_velocity``,
+        ``motor_torque``, ``output_angle``, ``output_velocity``, ``output_torque``, ``load_torque``,
+        ``temperature``, as far as mapped; ``transmission_error`` where both angles and the ratio are known.
+        Masked numbers are NaN. Time counts from the first sample. The metadata hold the source, its SHA-256,
+        the mapping, the ratio, and under ``gaps`` the gaps as JSON, [[start, end], ...] in s.
+
+    Raises:
+        InputError: the mapping is wrong (with file and line), does not fit the file, or the file is damaged.
+    """
+    path = Path(path)
+    if mapping is None:
+        if path.suffix != ".mcap":
+            raise InputError(
+                f"{path}: only a log of hdsim (.mcap) needs no mapping; name one (--mapping MAP.yaml)"
+            )
+        from hdsim.log.reader import open_log
+
+        return open_log(path)
+    if not isinstance(mapping, Mapping):
+        from hdsim.scenario import load_model
+
+        mapping = load_model(mapping, Mapping)
+    return _Import(path, mapping).recording()
+
+
+class _Import:
+    """One recording on its way."""
+
+    def __init__(self, path: Path, mapping: Mapping) -> None:
+        self.path = path
+        self.mapping = mapping
+        self.events: list[Event] = []
+        self._first_ns: int | None = None
+
+    def recording(self) -> Recording:
+        mapping = self.mapping
+        given = mapping.channels.given()
+        time, raw = self._samples(given)
+        start = time[0]
+        time = time - start
+        columns = {name: self._convert(name, channel, raw[name]) for name, channel in given.items()}
+        masked = self._mask(time, columns)
+        if mapping.ratio is not None and {"motor_angle", "output_angle"} <= set(columns):
+            columns["transmission_error"] = columns["output_angle"] - columns["motor_angle"] / mapping.ratio
+        gaps = self._gaps(time)
+        self._tell(given, masked)
+        table = Table(time, {name: _column(name, values) for name, values in columns.items()})
+        return Recording(
+            {"state": table},
+            events=sorted(self.events, key=lambda event: event.time),
+            metadata=self._metadata(float(start), gaps),
+        )
+
+    def _samples(self, given: dict[str, _Channel]) -> tuple[Array, dict[str, Array]]:
+        """Times in s and recorded numbers of every channel, one row a sample."""
+        mapping, clock = self.mapping, self.mapping.time
+        origins = {name: _origin(channel) for name, channel in given.items()}
+        wanted = [*origins.values(), *(select.origin for select in mapping.select)]
+        time_origin = None
+        if clock.column is not None or clock.field is not None:
+            time_origin = Origin(column=clock.column, topic=clock.topic, field=clock.field)
+            wanted.append(time_origin)
+        found = foreign.read(self.path, mapping, list(dict.fromkeys(wanted)))
+        lead = clock.topic or next(iter(origins.values())).topic or ""
+        if lead not in found:
+            raise InputError(f"{self.path}: the time's topic {lead!r} gives no channel: name a field of it")
+        times = {}
+        # The leading topic first: the others count from its first stamp.
+        for topic, samples in sorted(found.items(), key=lambda item: item[0] != lead):
+            own = time_origin is not None and (topic == lead)
+            recorded = samples.values[time_origin] if own and time_origin is not None else None
+            times[topic] = self._time(topic, samples, recorded, leads=topic == lead)
+        time = times[lead]
+        rows = {
+            origin: values if topic == lead else _at(time, times[topic], values)
+            for topic, samples in found.items()
+            for origin, values in samples.values.items()
+        }
+        keep = np.ones(len(time), bool)
+        for select in mapping.select:
+            values = rows[select.origin]
+            keep &= (values >= select.at_least) & (values <= select.at_most)
+        if not keep.any():
+            raise InputError(f"{self.path}: no row meets the mapping's select")
+        return time[keep], {name: rows[origin][keep] for name, origin in origins.items()}
+
+    def _time(self, topic: str, samples: foreign.Samples, recorded: Array | None, *, leads: bool) -> Array:
+        """Times of the samples of a topic, in s, strictly increasing."""
+        clock = self.mapping.time
+        place = f"{self.path}: {topic}" if topic else str(self.path)
+        count = len(next(iter(samples.values.values())))
+        if count < 2:
+            raise InputError(f"{place}: it is empty" if not count else f"{place}: one sample is no recording")
+        if clock.rate_hz is not None:
+            return np.arange(count) / clock.rate_hz
+        if recorded is not None:
+            time = recorded * TIME_UNITS[clock.unit or "s"]
+            if clock.wraps_at is not None:
+                time = np.unwrap(time, period=clock.wraps_at * TIME_UNITS[clock.unit or "s"])
+        elif topic:
+            time = self._stamped(samples, place, leads)
+        else:
+            raise InputError(f"{place}: the mapping's time names neither a column nor a rate_hz")
+        bad = np.flatnonzero(~np.isfinite(time))
+        if len(bad):
+            raise InputError(f"{place}: sample {bad[0] + 1} has no time")
+        if clock.quantised:
+            return _spread(time, place)
+        back = np.flatnonzero(np.diff(time) <= 0)
+        if len(back):
+            k = int(back[0])
+            raise InputError(
+                f"{place}: time does not increase: sample {k + 2} at {time[k + 1]:.9g} s follows "
+                f"{time[k]:.9g} s ({len(back)} such places). Sort or cut the recording; a clock coarser than "
+                f"the samples needs `quantised: true`, a counter that starts anew `wraps_at`"
+            )
+        return time
+
+    def _stamped(self, samples: foreign.Samples, place: str, leads: bool) -> Array:
+        """Stamps of messages in s, counted from the first of all topics, which keeps them exact to 1 ns."""
+        kind = self.mapping.time.stamp
+        stamps = samples.stamps.get(kind)
+        if stamps is None:
+            if leads:
+                raise InputError(f"{place}: its messages have no {kind} stamp")
+            stamps = samples.stamps["log"]
+        if self._first_ns is None:
+            self._first_ns = int(stamps[0])
+        return np.asarray(1e-9 * (stamps - self._first_ns), np.float64)
+
+    def _convert(self, name: str, channel: _Channel, raw: Array) -> Array:
+        """Recorded numbers in SI units on the channel's own side.
+
+        An angle at the output times the ratio is the angle of the motor; torque goes the other way, because
+        the power is the same.
+        """
+        values: Array = np.asarray(channel.si(raw), np.float64)
+        if isinstance(channel, AngleChannel) and channel.unwrap:
+            sound = np.isfinite(values)
+            values = values.copy()
+            values[sound] = np.unwrap(values[sound])
+        side, own = getattr(channel, "side", None) or side_of(name), side_of(name)
+        if side == own:
+            return values
+        ratio = self.mapping.ratio
+        assert ratio is not None  # the mapping has been checked for it
+        to_motor = own == "motor"
+        if isinstance(channel, TorqueChannel):
+            return values / ratio if to_motor else values * ratio
+        return values * ratio if to_motor else values / ratio
+
+    def _mask(self, time: Array, columns: dict[str, Array]) -> dict[str, int]:
+        """Set what the masks name to NaN; returns how many numbers of each channel."""
+        masked = {name: np.zeros(len(time), bool) for name in columns}
+        for mask in self.mapping.masks:
+            for name in mask.channels or tuple(columns):
+                if isinstance(mask, IntervalMask):
+                    masked[name] |= (time >= mask.start_s) & (time <= mask.end_s)
+                else:
+                    masked[name] |= outliers(columns[name], mask)
+        for name, where in masked.items():
+            columns[name] = np.where(where, np.nan, columns[name])
+        return {name: int(where.sum()) for name, where in masked.items() if where.any()}
+
+    def _gaps(self, time: Array) -> list[tuple[float, float]]:
+        longest = self.mapping.longest_gap_s
+        if longest is None:
+            return []
+        places = np.flatnonzero(np.diff(time) > longest)
+        gaps = [(float(time[k]), float(time[k + 1])) for k in places]
+        for start, end in gaps[:_TOLD_GAPS]:
+            self.events.append(Event(start, "warning", "import", f"gap of {end - start:.6g} s"))
+        if len(gaps) > _TOLD_GAPS:
+            self.events.append(Event(gaps[_TOLD_GAPS][0], "warning", "import", f"{len(gaps)} gaps in all"))
+        return gaps
+
+    def _tell(self, given: dict[str, _Channel], masked: dict[str, int]) -> None:
+        absent = [name for name in Channels.model_fields if name not in given]
+        self.events.append(Event(0.0, "info", "import", f"imported {self.path.name}: {', '.join(given)}"))
+        if absent:
+            self.events.append(Event(0.0, "info", "import", f"not measured: {', '.join(absent)}"))
+        for name, count in masked.items():
+            self.events.append(Event(0.0, "info", "import", f"{count} samples of {name} masked"))
+
+    def _metadata(self, start: float, gaps: list[tuple[float, float]]) -> dict[str, str]:
+        from hdsim.scenario.writer import to_yaml
+
+        found = {
+            naming.ORIGIN_KEY: naming.MEASURED,
+            "source": self.path.name,
+            "mapping": to_yaml(self.mapping.model_dump(mode="json", exclude_defaults=True)),
+            "start_of_time": f"{start!r} s" if self._first_ns is None else f"{self._first_ns} ns since 1970",
+            "gaps": json.dumps(gaps),
+        }
+        if self.path.is_file():
+            with open(self.path, "rb") as file:
+                found["source_sha256"] = hashlib.file_digest(file, "sha256").hexdigest()
+        if self.mapping.ratio is not None:
+            found["ratio"] = repr(self.mapping.ratio)
+        if self.mapping.description:
+            found["description"] = self.mapping.description
+        return found
+
+
+def outliers(values: Array, mask: OutlierMask) -> NDArray[np.bool_]:
+    """Samples that stand out from the median of their neighbours, shape (n,); see `OutlierMask`."""
+    from scipy.ndimage import median_filter
+
+    sound = np.isfinite(values)
+    if sound.sum() < 2:
+        return np.zeros(len(values), bool)
+    whole = np.interp(np.arange(len(values)), np.flatnonzero(sound), values[sound])
+    reach = 2 * mask.width_samples + 1
+    padded = np.pad(whole, reach, mode="reflect", reflect_type="odd") if len(whole) > reach else whole
+    if len(padded) == len(whole):
+        return np.zeros(len(values), bool)
+    # Halfway between two samples on either side: on a straight line that is where the sample should be, and
+    # of the pairs more are sound than not beside a spike that is no wider than stated.
+    n = len(whole)
+    pairs = [
+        0.5 * (padded[reach - d : reach - d + n] + padded[reach + d : reach + d + n])
+        for d in range(1, reach + 1)
+    ]
+    off = np.abs(whole - np.median(pairs, axis=0))
+    # 1.4826 times the median deviation estimates a normal distribution's standard deviation.
+    spread = 1.4826 * median_filter(off, mask.window_samples, mode="nearest")
+    steps = np.abs(np.diff(whole))
+    quantum = float(np.min(steps[steps > 0], initial=np.inf))
+    found: NDArray[np.bool_] = (off > mask.threshold * spread) & (off > 3 * quantum)
+    return found
+
+
+def _spread(time: Array, place: str) -> Array:
+    """Even times for samples that share one: linear over the sample number between changes of the clock."""
+    steps = np.diff(time)
+    if (steps < 0).any():
+        k = int(np.flatnonzero(steps < 0)[0])
+        raise InputError(f"{place}: time goes back: sample {k + 2} at {time[k + 1]:.9g} s")
+    first = np.flatnonzero(np.concatenate([[True], steps > 0]))
+    if len(first) < 2:
+        raise InputError(f"{place}: the clock never advances")
+    index = np.arange(len(time), dtype=np.float64)
+    # After the last change the mean rate goes on.
+    rate = (time[first[-1]] - time[first[0]]) / (first[-1] - first[0])
+    end = time[first[-1]] + rate * (len(time) - first[-1])
+    even: Array = np.interp(index, np.append(first, len(time)), np.append(time[first], end))
+    return even
+
+
+def _at(time: Array, other: Array, values: Array) -> Array:
+    """Numbers of another topic at the times of the leading one; NaN outside of its time."""
+    found: Array = np.interp(time, other, values, left=np.nan, right=np.nan)
+    return found
+
+
+def _origin(channel: _Channel) -> Origin:
+    return Origin(column=channel.column, topic=channel.topic, field=channel.field, joint=channel.joint)
+
+
+def _column(name: str, values: Array) -> Column:
+    if name == "transmission_error":
+        return Column(values, "rad", "measured output angle less motor angle over ratio")
+    return Column(values, UNITS[name.rsplit("_", 1)[-1]], "measured")
+
+
+def write_imported(recording: Recording, path: str | Path) -> Path:
+    """Write an imported recording as a log, with its mapping attached."""
+    from hdsim.log.writer import write_log
+
+    files: dict[str, Any] = {}
+    if "mapping" in recording.metadata:
+        files["mapping.yaml"] = recording.metadata["mapping"]
+    return write_log(
+        recording, path, attachments=files, scene=recording.metadata.get(naming.ORIGIN_KEY) != naming.MEASURED
+    )
