@@ -244,8 +244,9 @@ class Teeth:
         return twist, self.torque(twist)[1]
 
     def wind_up(self, torque_nm: float) -> float:
-        """Twist (rad) of the mesh by a torque (N m), both at the output; with pitch errors half of that between
-        plus and minus the torque, because they also shift its zero.
+        """Twist (rad) of the mesh by a torque (N m), both at the output.
+
+        Pitch errors also shift its zero; with them it is half of that between plus and minus the torque.
         """
         twist = self.loaded(torque_nm / self.scale)[0]
         if self._header[_mesh.LARGEST_PITCH_ERROR] > 0.0:

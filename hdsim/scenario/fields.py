@@ -135,17 +135,16 @@ def split_unit(name: str) -> tuple[str, str]:
     """A field's name in words, and the unit that it ends with or an empty text.
 
     Example:
-        >>> split_unit("torsional_stiffness_nm_per_rad"), split_unit("motor_kg_m2"), split_unit("ratio")
-        (('torsional stiffness', 'N m/rad'), ('motor', 'kg m^2'), ('ratio', ''))
+        >>> split_unit("torsional_stiffness_nm_per_rad"), split_unit("gain_per_s"), split_unit("ratio")
+        (('torsional stiffness', 'N m/rad'), ('gain', '1/s'), ('ratio', ''))
     """
     parts = name.split("_")
     start = len(parts)
     while start > 1 and (parts[start - 1] in UNITS or parts[start - 1] == "per"):
         start -= 1
-    while start < len(parts) and parts[start] == "per":
-        start += 1
-    over, _, under = " ".join(parts[start:]).partition(" per ")
-    unit = " ".join(UNITS[part] for part in over.split() if part != "per")
+    inverse = parts[start : start + 1] == ["per"]
+    over, _, under = " ".join(["1", *parts[start:]] if inverse else parts[start:]).partition(" per ")
+    unit = "1" if inverse else " ".join(UNITS[part] for part in over.split() if part != "per")
     below = " ".join(UNITS[part] for part in under.split() if part != "per")
     if below:
         unit += f"/({below})" if " " in below else f"/{below}"

@@ -56,8 +56,8 @@ def counter(title: str) -> Iterator[Callable[[int, int], object] | None]:
 def study(file: Path, output: Path | None, workers: int, scheduler: str | None, resume: bool) -> int:
     """Make every run of STUDY.yaml and write table, summary and pictures.
 
-    A study that was stopped goes on where it was; its results are the same, and do not depend on the number of
-    workers.
+    A study that was stopped goes on where it was; its results are the same, and do not depend on the number
+    of workers.
     """
     import time
 
@@ -84,8 +84,11 @@ def study(file: Path, output: Path | None, workers: int, scheduler: str | None, 
     _tell_summary(summarise(plan, result.table), plan.study.confidence)
     for reason, count in _reasons(result.table.columns["reason"].values):
         click.echo(f"failed  {count} run(s): {reason}")
-    for path in write_results(result, folder):
+    written, troubles = write_results(result, folder)
+    for path in written:
         click.echo(f"wrote   {path}")
+    for trouble in troubles:
+        click.echo(f"warning: {trouble}", err=True)
     return 0
 
 
@@ -100,14 +103,14 @@ def _tell_summary(summaries: list[Any], confidence: float) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from hdsim.study.engine.plots import _words
+    from hdsim.study.engine.plots import words
 
     shown = Table(
         "metric", "at", "runs", "mean", f"{confidence:.0%} interval", "median", "5 % .. 95 %", "unit"
     )
     for s in summaries[:40]:
         shown.add_row(
-            s.metric, _words(s.point), str(s.runs), f"{s.mean.value:.5g}",
+            s.metric, words(s.point), str(s.runs), f"{s.mean.value:.5g}",
             f"{s.mean.low:.5g} .. {s.mean.high:.5g}" if s.runs > 1 else "", f"{s.median:.5g}",
             f"{s.low:.5g} .. {s.high.value:.5g}" if s.runs > 1 else "", s.unit,
         )  # fmt: skip
@@ -208,13 +211,13 @@ def tolerance(
 
     def tell(probe: Probe) -> None:
         click.echo(
-            f"  {probe.value:<12.5g} {probe.passing:>6.1%} of the drives within, quantile {probe.quantile:.4g}"
+            f"  {probe.value:<12.5g} {probe.passing:>6.1%} of drives within, quantile {probe.quantile:.4g}"
         )
 
     with executor(workers, scheduler) as (pool, width):
         found = find_tolerance(
-            loaded, metric=metric, limit=limit, parameter=parameter, confidence=confidence, replicates=replicates,
-            low=low, high=high, seed=seed, pool=pool, width=width, on_probe=tell,
+            loaded, metric=metric, limit=limit, parameter=parameter, confidence=confidence,
+            replicates=replicates, low=low, high=high, seed=seed, pool=pool, width=width, on_probe=tell,
         )  # fmt: skip
     what = f"{found.metric} <= {limit:g} {found.unit} for {confidence:.1%} of the drives"
     if found.value is None:
@@ -223,8 +226,8 @@ def tolerance(
         more = " (the end of the range: all of it does)" if found.whole_range else ""
         click.echo(f"{parameter} = {found.value:.5g} {found.parameter_unit} still meets {what}{more}")
         click.echo(
-            f"of all drives at least {found.yield_low:.1%} meet it there (Clopper-Pearson, {confidence:.1%} confidence, "
-            f"{replicates} drives; more replicates raise this bound)"
+            f"of all drives at least {found.yield_low:.1%} meet it there (Clopper-Pearson, "
+            f"{confidence:.1%} confidence, {replicates} drives; more replicates raise this bound)"
         )
     stem = (Path("results") if output is None else output) / f"{scenario.stem}-tolerance"
     click.echo(f"wrote   {found.write_csv(stem.with_suffix('.csv'))}")

@@ -237,5 +237,5 @@ def test_scheduler_that_does_not_answer_is_an_input_error(tmp_path, monkeypatch)
     distributed = pytest.importorskip("distributed")
     real = distributed.Client
     monkeypatch.setattr(distributed, "Client", lambda address, timeout: real(address, timeout="0.5s"))
-    with pytest.raises(InputError, match="no Dask scheduler answers at tcp://127.0.0.1:1"):
+    with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         run_study(plan(study()), tmp_path, scheduler="tcp://127.0.0.1:1")

@@ -5,9 +5,9 @@ With E(S) the error of a run in which the causes S are on, and N all of them:
     whole = E(N),  rest = E({}),  removed_i = E(N) - E(N without i),  alone_i = E({i}) - E({})
     interaction = whole - rest - sum removed_i
 
-The interaction is zero when the causes add up (removed_i = alone_i); what couples them, such as a gap that only a
-load closes, is in it and nowhere else. It is the remainder of a one-at-a-time analysis (Saltelli et al. 2008,
-Global Sensitivity Analysis, section 1.2).
+The interaction is zero when the causes add up (removed_i = alone_i); what couples them, such as a gap that
+only a load closes, is in it and nowhere else. It is the remainder of a one-at-a-time analysis (Saltelli et
+al. 2008, Global Sensitivity Analysis, section 1.2).
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ POSITIONING = "positioning_error"
 _KINEMATIC = ("kinematic_error", "wave_generator_eccentricity", "output_eccentricity", "damaged_tooth")
 _HYSTERESIS = ("torsional_hysteresis_maxwell", "torsional_hysteresis_duhem")
 _FRICTION = (
-    "input_coulomb_viscous", "stribeck_friction", "lugre_friction", "load_dependent_loss", "load_side_friction",
-    "thermal_friction", "motor_torque_ripple",
+    "input_coulomb_viscous", "stribeck_friction", "lugre_friction", "load_dependent_loss",
+    "load_side_friction", "thermal_friction", "motor_torque_ripple",
 )  # fmt: skip
 #: Damping, as a share of the critical, of the load on the drive once no controller damps it.
 _DAMPING = 0.2
@@ -209,8 +209,8 @@ def error_budget(scenario: Scenario, *, metric: str | None = None, pool: Executo
 
     Args:
         scenario: what is positioned. With a position command and dwells, the error is output angle less
-            commanded angle (arcsec, with its sign) at the dwell where it is largest, the mean over the last fifth
-            of the dwell; without, it is the peak-to-peak transmission error of the run.
+            commanded angle (arcsec, with its sign) at the dwell where it is largest, the mean over the last
+            fifth of the dwell; without, it is the peak-to-peak transmission error of the run.
         metric: any metric by name, to be split instead.
         pool: where the runs are made; in this process when None.
 
@@ -225,7 +225,7 @@ def error_budget(scenario: Scenario, *, metric: str | None = None, pool: Executo
     pool = pool or InProcess()
     text = json.dumps(_prepared(scenario))
     whole_run, _ = _run(text, everything)
-    reference = whole_run["reference_angle"] if "reference_angle" in whole_run else None
+    reference = whole_run["reference_angle"] if "reference_angle" in whole_run else None  # noqa: SIM401
     error, unit, dwell = _chosen(whole_run, metric)
 
     sets: list[tuple[str, ...]] = [everything, ()]
@@ -344,13 +344,14 @@ def plot_budget(budget: Budget) -> Figure:
     ]
     name = budget.error.replace("_", " ")
     about = (
-        f"Bars add up to the whole: how much the {name} changes when one cause is switched off. Ring: the cause alone, "
-        f"all others off; far from its bar's length, the causes work together (interaction)."
+        f"Bars add up to the whole: how much the {name} changes when one cause is switched off. "
+        f"Ring: the cause alone, all others off; far from its bar's length, the causes work "
+        f"together (interaction)."
     )
     if budget.error == POSITIONING:
         about = f"Output less commanded angle, at rest, where it is largest. {about}"
     size = (9.0, max(3.2, 2.0 + 0.45 * len(rows)))
-    with page(f"{budget.scenario}: where the {name} comes from", about, size) as (figure, axes):
+    with page(f"{budget.scenario}: where the {name} comes from", about, size, 100) as (figure, axes):
         start, last = 0.0, len(rows)
         ends = [0.0]
         for k, (_title, value, colour) in enumerate(rows):

@@ -251,7 +251,8 @@ class Study(Parameters):
         random = self.distributions
         if random and self.sampling is None:
             raise ValueError(
-                f"{', '.join(random)} has a distribution, so the study needs sampling: {{type: ..., samples: ...}}"
+                f"{', '.join(random)} has a distribution, so the study needs "
+                f"sampling: {{type: ..., samples: ...}}"
             )
         if self.sampling is not None and not random:
             raise ValueError(

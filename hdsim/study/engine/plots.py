@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hdsim.plot import style
 from hdsim.study.engine.reading import described
-from hdsim.study.engine.sensitivity import Sensitivity, indices, is_sensitivity
+from hdsim.study.engine.sensitivity import Sensitivity, is_sensitivity
 from hdsim.study.engine.summary import MetricSummary
 from hdsim.study.engine.table import StudyTable
 
@@ -31,7 +31,12 @@ _SIZE = (8.5, 5.2)
 _LINES = (style.BLUE, style.ORANGE, style.GREEN, style.BLACK, "#CC79A7", "#56B4E9", "#E69F00")
 
 
-def study_figures(plan: Plan, table: StudyTable, summaries: Sequence[MetricSummary]) -> dict[str, Figure]:
+def study_figures(
+    plan: Plan,
+    table: StudyTable,
+    summaries: Sequence[MetricSummary],
+    sensitivities: Sequence[Sensitivity] = (),
+) -> dict[str, Figure]:
     """Every picture that fits the design, by file name without ending.
 
     One stated number: a curve over it; two: a heat map; anything else that is stated: bars. Distributions or
@@ -39,7 +44,6 @@ def study_figures(plan: Plan, table: StudyTable, summaries: Sequence[MetricSumma
     """
     found: dict[str, Figure] = {}
     factors = list(plan.study.factors)
-    found_indices = indices(plan, table) if is_sensitivity(plan.study) else []
     for metric in plan.metrics:
         mine = [s for s in summaries if s.metric == metric.name]
         if not any(s.runs for s in mine):
@@ -53,17 +57,23 @@ def study_figures(plan: Plan, table: StudyTable, summaries: Sequence[MetricSumma
             found[f"{metric.name}-bars"] = bars(plan, metric, mine)
         elif len(table) > 1:
             found[f"{metric.name}-histogram"] = histogram(plan, metric, table, mine[0])
-        if found_indices:
-            ranked = [s for s in found_indices if s.metric == metric.name]
+        if sensitivities:
+            ranked = [s for s in sensitivities if s.metric == metric.name]
             found[f"{metric.name}-sensitivity"] = sensitivity_bars(plan, metric, ranked)
-        elif plan.study.distributions and len(table) > 2 * len(plan.study.distributions) + 2:
+        elif (
+            plan.study.distributions
+            and not is_sensitivity(plan.study)
+            and len(table) > 2 * len(plan.study.distributions) + 2
+        ):
             found[f"{metric.name}-tornado"] = tornado(plan, metric, table)
     return found
 
 
 @contextmanager
-def page(title: str, about: str, size: tuple[float, float] = _SIZE) -> Iterator[tuple[Figure, Axes]]:
-    """A figure with one pair of axes, a title and a line below it that says what is shown."""
+def page(
+    title: str, about: str, size: tuple[float, float] = _SIZE, wide: int = 105
+) -> Iterator[tuple[Figure, Axes]]:
+    """A figure with one pair of axes, a title and lines of ``wide`` letters that say what is shown."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -71,7 +81,9 @@ def page(title: str, about: str, size: tuple[float, float] = _SIZE) -> Iterator[
         figure = Figure(figsize=size, dpi=style.DPI, layout="constrained")
         axes = figure.subplots()
         figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
-        axes.set_title("\n".join(textwrap.wrap(about, 110)), fontweight="normal", fontsize=9, color="#444444")
+        axes.set_title(
+            "\n".join(textwrap.wrap(about, wide)), fontweight="normal", fontsize=9, color="#444444"
+        )
         yield figure, axes
 
 
@@ -106,12 +118,15 @@ def _logarithmic(axes: Axes, axis: str, values: Array) -> None:
         (axes.set_xscale if axis == "x" else axes.set_yscale)("log")
 
 
-def _words(point: dict[str, Any]) -> str:
+def words(point: dict[str, Any]) -> str:
+    """A combination of stated values, for people."""
     return ", ".join(f"{described(name)} = {_short(value)}" for name, value in point.items())
 
 
 def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else ("off" if value is None else str(value))
+    if value is None or value in ("null", "{}", {}):
+        return "off" if value is None or value == "null" else "on"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def curves(
@@ -122,8 +137,8 @@ def curves(
     about = "mean of the runs at each value"
     if several:
         about = (
-            f"line: mean with its {plan.study.confidence:.0%} confidence interval; band: 5 % to 95 % quantile of "
-            f"{max(s.runs for s in summaries)} runs at each value"
+            f"line: mean with its {plan.study.confidence:.0%} confidence interval; band: 5 % to 95 % "
+            f"quantile of {max(s.runs for s in summaries)} runs at each value"
         )
     with page(_title(plan, metric), f"{metric.description}. {about[0].upper()}{about[1:]}.") as (
         figure,
@@ -132,7 +147,7 @@ def curves(
         others = [name for name in factors if name != over]
         groups: dict[str, list[MetricSummary]] = {}
         for s in summaries:
-            groups.setdefault(_words({name: s.point[name] for name in others}), []).append(s)
+            groups.setdefault(words({name: s.point[name] for name in others}), []).append(s)
         for k, (name, group) in enumerate(groups.items()):
             group = sorted((s for s in group if s.runs), key=lambda s: float(s.point[over]))
             x = np.array([float(s.point[over]) for s in group])
@@ -188,13 +203,14 @@ def heat_map(
 def bars(plan: Plan, metric: Metric, summaries: Sequence[MetricSummary]) -> Figure:
     """Mean of every combination of stated values, with interval."""
     size = (_SIZE[0], max(2.5, 1.6 + 0.32 * len(summaries)))
-    about = f"{metric.description}. Bar: mean; whisker: {plan.study.confidence:.0%} confidence interval of the mean."
-    with page(_title(plan, metric), about, size) as (figure, axes):
+    interval = f"{plan.study.confidence:.0%} confidence interval of the mean"
+    about = f"{metric.description}. Bar: mean; whisker: {interval}."
+    with page(_title(plan, metric), about, size, 80) as (figure, axes):
         at = np.arange(len(summaries))[::-1]
         mean = np.array([s.mean.value for s in summaries])
         reach = np.array([[s.mean.value - s.mean.low, s.mean.high - s.mean.value] for s in summaries]).T
         axes.barh(at, np.nan_to_num(mean), xerr=np.nan_to_num(reach), color=style.BLUE, capsize=3)
-        axes.set_yticks(at, [_words(s.point) for s in summaries])
+        axes.set_yticks(at, [words(s.point) for s in summaries])
         axes.set_xlabel(label(named(metric), metric.unit))
         axes.grid(axis="y", visible=False)
     return figure
@@ -209,7 +225,7 @@ def histogram(plan: Plan, metric: Metric, table: StudyTable, summary: MetricSumm
     with page(_title(plan, metric), about) as (figure, axes):
         edges = np.histogram_bin_edges(good, bins="fd" if np.ptp(good) > 0 else 1)
         edges = edges if len(edges) <= 81 else np.linspace(good.min(), good.max(), 81)
-        axes.hist(good, bins=edges, color=style.BLUE, alpha=0.6, edgecolor="white", linewidth=0.5)
+        axes.hist(good, bins=list(edges), color=style.BLUE, alpha=0.6, edgecolor="white", linewidth=0.5)
         for interval, colour, name in (
             (summary.mean, style.BLACK, "mean"),
             (summary.high, style.ORANGE, "95 % of the runs stay below"),
@@ -255,12 +271,12 @@ def tornado(plan: Plan, metric: Metric, table: StudyTable) -> Figure:
     values = table.values(metric.name)
     mean = float(np.nanmean(values))
     about = (
-        f"{metric.description}. Bars: mean of the metric as a parameter goes from its 5 % to its 95 % quantile "
-        f"(numbers at the ends) and the others stay at their means; linear regression over "
+        f"{metric.description}. Bars: mean of the metric as a parameter goes from its 5 % to its 95 % "
+        f"quantile (numbers at the ends) and the others stay at their means; linear regression over "
         f"{int(np.isfinite(values).sum())} runs"
     )
     size = (_SIZE[0], max(2.8, 1.9 + 0.5 * len(found)))
-    with page(_title(plan, metric), about + ".", size) as (figure, axes):
+    with page(_title(plan, metric), about + ".", size, 80) as (figure, axes):
         reach = max(abs(end - mean) for entry in found for end in entry[1:3]) or 1.0
         for k, (_name, at_low, at_high, low, high) in enumerate(reversed(found)):
             axes.barh(k, at_low - mean, left=mean, color=style.BLUE, height=0.6)
@@ -292,14 +308,14 @@ def sensitivity_bars(plan: Plan, metric: Metric, found: Sequence[Sensitivity]) -
     ranked = sorted(found, key=lambda s: s.cost)
     sobol = plan.study.sampling is not None and plan.study.sampling.type == "sobol_indices"
     what = (
-        "standard deviation of the metric that would remain if only this parameter (with its interactions) varied, "
-        "sqrt(total Sobol index x variance); in brackets the first-order and the total index"
+        "standard deviation of the metric that would remain if only this parameter (with its interactions) "
+        "varied, sqrt(total Sobol index x variance); in brackets the first-order and the total index"
         if sobol
-        else "mean size of the change as the parameter crosses its range (Morris' mu*); in brackets the standard "
-        "deviation of that change"
+        else "mean size of the change as the parameter crosses its range (Morris' mu*); in brackets the "
+        "standard deviation of that change"
     )
     size = (_SIZE[0], max(2.8, 1.9 + 0.42 * len(ranked)))
-    with page(_title(plan, metric), f"{metric.description}. Bars: {what}.", size) as (figure, axes):
+    with page(_title(plan, metric), f"{metric.description}. Bars: {what}.", size, 80) as (figure, axes):
         axes.barh(range(len(ranked)), [s.cost for s in ranked], color=style.BLUE, height=0.6)
         for k, s in enumerate(ranked):
             extra = f"{s.first:.2f}, {s.total:.2f}" if sobol else f"{s.first:.3g}"

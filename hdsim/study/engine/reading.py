@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from hdsim.errors import InputError
 from hdsim.scenario.extends import read_tree, resolve_extends
+from hdsim.scenario.fields import split_unit
 from hdsim.scenario.problems import Mark, Problem, ScenarioError, dotted
 from hdsim.scenario.reader import KeyPath, Node, Source, flatten
 from hdsim.scenario.validation import build
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from hdsim.scenario.model import Scenario
     from hdsim.study.engine.design import RunPoint
     from hdsim.study.registry import Metric
+
+#: Sections whose name says nothing more about a parameter.
+_SECTIONS = ("drive", "effects", "command", "load", "run", "options")
 
 
 @dataclass(frozen=True)
@@ -228,17 +232,15 @@ def _mistake(single: Recipe, name: str, value: Any) -> str:
 
 
 def described(path: str) -> str:
-    """Last part of a parameter's name, in words.
+    """Last parts of a parameter's name, in words.
 
     Example:
         >>> described("drive.mesh.flanks.flexspline.fractal_dimension")
         'flexspline fractal dimension'
     """
-    parts = [str(part) for part in parse(path)]
-    from hdsim.scenario.fields import split_unit
-
-    last = split_unit(parts[-1])[0]
-    if len(parts) > 1 and not parts[-2].isdigit():
-        return f"{parts[-2]} {last}".replace("_", " ")
-    head = " ".join(parts[-3:-1]) if len(parts) > 2 else ""
-    return f"{head} {last}".replace("_", " ").strip()
+    *before, last = parse(path)
+    while before and before[-1] in _SECTIONS:
+        before.pop()
+    # An entry of a list needs the list's name and its owner's.
+    owner = before[-1:] if before and isinstance(before[-1], str) else before[-3:]
+    return " ".join(str(part) for part in [*owner, split_unit(str(last))[0]]).replace("_", " ")

@@ -99,7 +99,7 @@ def indices(plan: Plan, table: StudyTable) -> list[Sensitivity]:
         missing = int(np.count_nonzero(~np.isfinite(values)))
         if missing:
             raise InputError(
-                f"{metric.name}: {missing} of {len(values)} samples have a failed run (see the column reason); "
+                f"{metric.name}: {missing} of {len(values)} samples have a failed run (column reason); "
                 f"sensitivity indices need them all: narrow the distributions"
             )
         found += _of_metric(study, metric.name, metric.unit, points, values)

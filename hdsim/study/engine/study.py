@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hdsim.errors import InputError
 from hdsim.study.engine.execute import batches, execute, executor
 from hdsim.study.engine.journal import Journal, key_of
 from hdsim.study.engine.reading import Plan
@@ -83,16 +84,16 @@ def run_study(
     return StudyResult(plan, table, len(missing), seconds)
 
 
-def write_results(result: StudyResult, folder: Path) -> list[Path]:
+def write_results(result: StudyResult, folder: Path) -> tuple[list[Path], list[str]]:
     """Write table (CSV, and Parquet where pyarrow is installed), summary, pictures and provenance.
 
     Returns:
-        The files.
+        The files, and what could not be made of the runs and why.
     """
     from importlib.util import find_spec
 
     from hdsim.study.engine.plots import study_figures
-    from hdsim.study.engine.sensitivity import indices, is_sensitivity, write_indices
+    from hdsim.study.engine.sensitivity import Sensitivity, indices, is_sensitivity, write_indices
     from hdsim.study.engine.summary import summarise, write_summary
 
     table, plan = result.table, result.plan
@@ -101,13 +102,20 @@ def write_results(result: StudyResult, folder: Path) -> list[Path]:
         written.append(table.write_parquet(folder / "results.parquet"))
     summaries = summarise(plan, table)
     written.append(write_summary(summaries, folder / "summary.csv", plan.study.confidence))
-    if is_sensitivity(plan.study):
-        written.append(write_indices(indices(plan, table), folder / "sensitivity.csv"))
     about = folder / "provenance.json"
     about.write_text(json.dumps(table.provenance, indent=1) + "\n", encoding="utf-8")
     written.append(about)
-    for name, figure in study_figures(plan, table, summaries).items():
+    troubles: list[str] = []
+    found: list[Sensitivity] = []
+    if is_sensitivity(plan.study):
+        try:
+            found = indices(plan, table)
+        except InputError as error:
+            troubles.append(str(error))
+        else:
+            written.append(write_indices(found, folder / "sensitivity.csv"))
+    for name, figure in study_figures(plan, table, summaries, found).items():
         path = folder / f"{name}.png"
         figure.savefig(path)
         written.append(path)
-    return written
+    return written, troubles

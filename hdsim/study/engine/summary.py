@@ -128,20 +128,10 @@ def write_summary(summaries: list[MetricSummary], path: Path, confidence: float)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         names = list(summaries[0].point) if summaries else []
-        writer.writerow(
-            [
-                "metric",
-                "unit",
-                *names,
-                "runs",
-                "failed",
-                "mean",
-                f"mean_low_{percent}",
-                f"mean_high_{percent}",
-            ]
-            + ["standard_deviation", "median", "q05", "q95", f"q95_low_{percent}", f"q95_high_{percent}"]
-            + ["least", "largest"]
-        )
+        interval = [f"mean_low_{percent}", f"mean_high_{percent}"]
+        upper = [f"q95_low_{percent}", f"q95_high_{percent}"]
+        spread = ["standard_deviation", "median", "q05", "q95", *upper, "least", "largest"]
+        writer.writerow(["metric", "unit", *names, "runs", "failed", "mean", *interval, *spread])
         for s in summaries:
             numbers = [s.mean.value, s.mean.low, s.mean.high, s.standard_deviation, s.median, s.low]
             numbers += [s.high.value, s.high.low, s.high.high, s.least, s.largest]

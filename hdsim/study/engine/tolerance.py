@@ -236,8 +236,11 @@ def plot_tolerance(found: Tolerance) -> Figure:
             )  # fmt: skip
         if x[0] > 0 and x[-1] > 10 * x[0]:
             axes.set_xscale("log")
-        if np.nanmin(shown) > 0 and np.nanmax(shown) > 30 * max(found.limit, np.nanmin(shown)):
-            axes.set_yscale("log")
+        lowest, highest = np.nanmin([p.metric for p in probes]), np.nanmax([p.metric for p in probes])
+        room = found.limit - lowest
+        if highest > found.limit + 4 * room > found.limit:
+            # Far beyond the limit a drive may not work at all; what matters is the way there.
+            axes.set_ylim(lowest - 0.2 * room, found.limit + 4 * room)
         axes.set_xlabel(label(described(found.parameter), found.parameter_unit))
         axes.set_ylabel(label(name, found.unit))
         axes.legend(loc="upper left")

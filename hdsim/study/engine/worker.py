@@ -1,4 +1,6 @@
-"""What happens on a worker: a batch of runs in, a row for each out. Everything that goes in can be pickled."""
+"""What happens on a worker: a batch of runs in, a row for each out. Everything that goes in
+can be pickled.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ import copy
 import json
 import math
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -154,7 +157,12 @@ class Row:
 
 def run_batch(batch: Batch) -> list[Row]:
     """Simulate and measure every run of a batch; a run that fails is a row with its reason."""
-    return [_run(batch, job) for job in batch.jobs]
+    from hdsim.contact.law import ValidityWarning
+
+    with warnings.catch_warnings():
+        # A thousand drives would say it a thousand times; ``hdsim run`` says it of the one that is looked at.
+        warnings.simplefilter("ignore", ValidityWarning)
+        return [_run(batch, job) for job in batch.jobs]
 
 
 def _run(batch: Batch, job: Job) -> Row:
@@ -221,7 +229,9 @@ def measured(names: Sequence[str], recording: Recording, scenario: Scenario) -> 
 
 
 def warm_start() -> None:
-    """Import what a run needs, and end with the process that started this one; initializer of worker processes."""
+    """Import what a run needs, and end with the process that started this one; initializer of worker
+    processes.
+    """
     import importlib
     import multiprocessing
     import os
