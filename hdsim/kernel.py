@@ -60,11 +60,10 @@ class Kernel:
 
     @cached_property
     def _compiled(self) -> Any:
-        from numba import cfunc
-
         from hdsim._abi import SIGNATURES
+        from hdsim._compile import compiled_address
 
-        return cfunc(SIGNATURES[self.contract], cache=True, error_model="numpy")(self.function)
+        return compiled_address(self.function, SIGNATURES[self.contract])
 
     @property
     def address(self) -> int:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from hdsim._abi import call_signal
+from hdsim._compile import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def evaluate(address, times, insides, parameters):  # type: ignore[no-untyped-def]
     """Call the signal kernel at ``address`` at each time; returns shape (4, n)."""
     result = np.empty((4, len(times)))

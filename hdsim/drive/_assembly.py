@@ -22,9 +22,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import carray, njit
+from numba import carray
 
 from hdsim._abi import call_element, call_mesh, call_signal, call_twist
+from hdsim._compile import compiled
 from hdsim.drive import _mesh
 from hdsim.kernel import (
     DELIVERED,
@@ -94,7 +95,7 @@ S_POTENTIAL = 42
 S_CONSTRAINT = 43  # three: torque that the prescription of a coordinate costs
 S_INPUTS = 48
 
-_jit: Any = njit(cache=True, nogil=True, error_model="numpy")
+_jit: Any = compiled
 
 
 @_jit

@@ -19,8 +19,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
-
+from hdsim._compile import compiled
 from hdsim.drive._window import lobe_potential
 from hdsim.kernel import mesh
 
@@ -64,8 +63,8 @@ SMOOTHING = 26  # half-width of the dead-zone's rounded corners, m
 CONSTANT_GAPS_AT = 27  # constant half-gaps of the teeth, twice over as the pitch errors; 0: none
 HEADER = 28
 
-_jit: Any = njit(cache=True, nogil=True, error_model="numpy")
-_inline: Any = njit(cache=True, nogil=True, error_model="numpy", inline="always")
+_jit: Any = compiled
+_inline: Any = compiled(inline="always")
 
 
 @_inline

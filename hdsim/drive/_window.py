@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
+from hdsim._compile import compiled
 
-_reordered: Any = njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
+_reordered: Any = compiled(fastmath={"reassoc", "contract"})
 
 
 @_reordered

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from hdsim._abi import call_system
+from hdsim._compile import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def evaluate(address, t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
     """Call the system kernel at ``address``."""
     call_system(address, t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt)
