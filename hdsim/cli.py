@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "hdsim.study.commands_engine:tolerance",
         "Find the largest tolerance that meets an accuracy.",
     ),
+    "linearize": ("hdsim.simulation.commands_linear:linearize", "Linearise a drive; its modes and Bode plot."),
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),
