@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from hdsim.errors import HdsimError
 from hdsim.recording import Column, Event, Recording, Table
 from hdsim.simulation.channels import Observer
+from hdsim.simulation.events import EventDetector
 from hdsim.simulation.solvers import Statistics, integrate
 
 if TYPE_CHECKING:
@@ -142,6 +143,12 @@ class Run:
         self.audit = Audit()
         self.statistics = Statistics()
         self.events: list[Event] = []
+        self.detector = EventDetector(model, duration_s)
+        #: Called before every span with its start (s); what it returns, if anything, is called once the
+        #: samples so far have been handed out: it may change the system's reals (live parameters).
+        self.before_span: Callable[[float], Callable[[], object] | None] | None = None
+        #: Samples of the state table that leave together, and the longest span in samples.
+        self.block = BLOCK
         self.failure: str | None = None
         self.interrupted: BaseException | None = None
         self._recent: Table | None = None
@@ -150,7 +157,7 @@ class Run:
         """Times at which the integration is cut, from 0 to the duration: shape (spans + 1,)."""
         cuts = [np.array([0.0, self.duration_s])]
         cuts += [np.asarray(signal.corners(0.0, self.duration_s)) for signal in self.model.signals]
-        longest = BLOCK / self.sample_rate_hz
+        longest = self.block / self.sample_rate_hz
         cuts.append(np.arange(1, math.ceil(self.duration_s / longest)) * longest)
         if self.loop is not None:
             cuts.append(
@@ -191,7 +198,14 @@ class Run:
         helds: list[Array] = []
         waiting = 0
         done = 0
+        self.events += self.detector.start(self.method)
         for t0, t1 in itertools.pairwise(cuts):
+            change = None if self.before_span is None else self.before_span(float(t0))
+            if change is not None:
+                if waiting:
+                    yield self._block(*(np.concatenate(part) for part in (times, states, insides, helds)))
+                    times, states, insides, helds, waiting = [], [], [], [], 0
+                change()
             inside = 0.5 * (t0 + t1)
             reals[a.INSIDE] = inside
             if self.loop is not None:
@@ -224,11 +238,12 @@ class Run:
                 on_time(found.t_end)
             if not found.success:
                 self._fail(found)
-            if waiting >= BLOCK or (waiting and (self.failure or t1 == cuts[-1])):
+            if waiting >= self.block or (waiting and (self.failure or t1 == cuts[-1])):
                 yield self._block(*(np.concatenate(part) for part in (times, states, insides, helds)))
                 times, states, insides, helds, waiting = [], [], [], [], 0
             if self.failure:
                 break
+        self.events += self.detector.finish(float(found.t_end), self.failure)
 
     def _control(self, t: float, y: Array, inside: float) -> None:
         """Let the sampled controller read the sensors and set the held torque."""
@@ -262,6 +277,7 @@ class Run:
             chosen = np.round(times * self.sample_rate_hz).astype(int) % self.teeth_every == 0
             if chosen.any():
                 tables["teeth"] = self.observer.teeth_table(times[chosen], rows[chosen])
+        self.events += self.detector.feed(tables, self.audit.exchanged, self.statistics)
         return tables
 
     def _fail(self, found: Any) -> None:

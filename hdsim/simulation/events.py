@@ -1,0 +1,331 @@
+"""What happens in a run, told in words: moves, limits, lost contact, saturation, doubtful solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.recording import Event
+
+if TYPE_CHECKING:
+    from hdsim.drive.model import Model
+    from hdsim.recording import Table
+    from hdsim.simulation.solvers import Statistics
+
+Array = NDArray[np.float64]
+
+#: Events of one kind that are told singly; the rest are counted.
+MOST = 12
+#: Share of the rated torque below which a flank counts as unloaded.
+UNLOADED = 1e-3
+#: Refused steps in a block below which nothing is said.
+FEW_STEPS = 100
+#: Share of the exchanged energy that the audit's residual may reach before it is a doubt.
+DOUBT = 1e-3
+
+
+@dataclass
+class Watch:
+    """A condition on one channel, with a margin between its beginning and its end.
+
+    Args:
+        source: who tells.
+        level: of the event at its beginning.
+        begins: what is told when ``value`` rises above ``on``; ``{value}`` is the number.
+        ends: what is told when it falls below ``off`` again; nothing when empty.
+        on: threshold of the beginning.
+        off: threshold of the end, at most ``on``.
+    """
+
+    source: str
+    level: str
+    begins: str
+    ends: str
+    on: float
+    off: float
+    _holds: bool = False
+    _last: tuple[float, float] | None = None
+
+    def feed(self, time: Array, value: Array) -> Iterator[Event]:
+        """Events in the next samples: time (n,) in s, value (n,)."""
+        if self._last is None:
+            self._last = (float(time[0]), -np.inf)
+        times = np.concatenate([[self._last[0]], time])
+        values = np.concatenate([[self._last[1]], value])
+        at = 1
+        while at < len(values):
+            threshold = self.off if self._holds else self.on
+            over = values[at:] >= threshold
+            changed = np.flatnonzero(over != self._holds)
+            if not len(changed):
+                break
+            at += int(changed[0])
+            self._holds = not self._holds
+            text = self.begins if self._holds else self.ends
+            if text:
+                moment = _crossing(times[at - 1 : at + 1], values[at - 1 : at + 1], threshold)
+                level = self.level if self._holds else "info"
+                yield Event(moment, level, self.source, text.format(value=values[at]))
+            at += 1
+        self._last = (float(times[-1]), float(values[-1]))
+
+
+@dataclass
+class Flanks:
+    """Torque that changes its sign: the teeth go from one flank through the gap to the other.
+
+    Args:
+        unloaded: torque below which no flank is loaded, N m.
+    """
+
+    unloaded: float
+    _side: float = 0.0
+    _left: float = 0.0
+
+    def feed(self, time: Array, torque: Array) -> Iterator[Event]:
+        """Events in the next samples: time (n,) in s, torque (n,) in N m."""
+        side = np.where(torque > self.unloaded, 1.0, np.where(torque < -self.unloaded, -1.0, 0.0))
+        loaded = np.flatnonzero(side)
+        for k in loaded[np.diff(side[loaded], prepend=self._side) != 0]:
+            if self._side:
+                before = loaded[loaded < k]
+                left = float(time[before[-1]]) if len(before) else self._left
+                way = (
+                    "from the positive to the negative"
+                    if side[k] < 0
+                    else "from the negative to the positive"
+                )
+                took = 1e3 * (float(time[k]) - left)
+                yield Event(left, "info", "mesh", f"gap crossed {way} flank in {took:.3g} ms")
+            self._side = float(side[k])
+        if len(loaded):
+            self._left = float(time[loaded[-1]])
+
+
+@dataclass
+class _Count:
+    told: int = 0
+    untold: int = 0
+    last: float = 0.0
+    level: str = "info"
+
+
+@dataclass
+class EventDetector:
+    """Finds the events of a run in the blocks of its tables.
+
+    Of each kind (a source and the words that don't depend on numbers) at most ``MOST`` are told; ``finish``
+    tells how many more there were.
+
+    Args:
+        model: the model that runs.
+        duration: length of the run, s.
+    """
+
+    model: Model
+    duration: float
+    _counts: dict[tuple[str, str], _Count] = field(default_factory=dict)
+    _reference: tuple[float, float] | None = None
+    _moving: bool | None = None
+    _steps: int = 0
+    _rejected: int = 0
+
+    def __post_init__(self) -> None:
+        rated = self.model.rated_torque_nm
+        margin = 0.98
+        self._output = [
+            Watch(
+                "drive",
+                "warning",
+                f"rated torque of {rated:.4g} N m exceeded",
+                "torque below the rated one again",
+                rated * (1 + 1e-3),
+                rated * margin,
+            )
+        ]
+        momentary = momentary_torque(self.model)
+        if momentary is not None:
+            self._output.append(
+                Watch(
+                    "drive",
+                    "error",
+                    f"momentary peak torque of {momentary:.4g} N m exceeded",
+                    "torque below the momentary peak again",
+                    momentary,
+                    momentary * margin,
+                )
+            )
+        self._flanks = Flanks(UNLOADED * rated)
+        limit = torque_limit(self.model)
+        self._limited_torque = bool(np.isfinite(limit))
+        self._saturation = Watch(
+            "motor",
+            "warning",
+            f"torque at its limit of {limit:.4g} N m",
+            "torque below its limit again",
+            limit * (1 - 1e-9),
+            limit * (1 - 1e-3),
+        )
+        self._idle = Watch("mesh", "info", "no tooth carries load", "teeth carry load again", -1e-12, -1e-9)
+        self._doubt = Watch(
+            "solver", "warning", "energy audit off by {value:.1e} of the energy exchanged", "", DOUBT, 0.0
+        )
+        engagement = getattr(self.model.drive.mesh, "engagement", None)
+        self._share: Watch | None = None
+        if engagement is not None:
+            share = engagement.share
+            self._share = Watch(
+                "mesh",
+                "info",
+                f"more teeth engaged than the {100 * share:.3g} % at rated torque",
+                "no more teeth engaged than at rated torque",
+                share * (1 + 1e-2),
+                share * (1 + 1e-6),
+            )
+        self._force: Watch | None = None
+        if self.model.teeth is not None:
+            # The contact law is tabulated to twenty times this force and goes on in a straight line.
+            end = 20 * self.model.teeth.rated_tooth_force_n
+            self._force = Watch(
+                "contact",
+                "warning",
+                f"tooth force beyond the contact table's {end:.4g} N",
+                "",
+                end,
+                0.5 * end,
+            )
+
+    def start(self, method: str) -> list[Event]:
+        """The event of the beginning."""
+        return [Event(0.0, "info", "run", f"run begins: {self.duration:g} s by {method}")]
+
+    def feed(self, tables: dict[str, Table], exchanged: float, work: Statistics) -> list[Event]:
+        """Events of a block, in the order of time.
+
+        Args:
+            tables: the block.
+            exchanged: energy that has gone through the drive so far, J.
+            work: of the solver so far.
+        """
+        state = tables["state"]
+        time = state.time
+        found: list[Event] = []
+        if not len(time):
+            return found
+        found += self._phases(state)
+        steps, rejected = work.steps - self._steps, work.rejected - self._rejected
+        self._steps, self._rejected = work.steps, work.rejected
+        if rejected > max(steps, FEW_STEPS):
+            text = f"hard to integrate: {rejected} steps refused, {steps} taken up to {time[-1]:.6g} s"
+            found.append(Event(float(time[0]), "warning", "solver", text))
+        torque = state["output_torque"]
+        for watch in self._output:
+            found += watch.feed(time, np.abs(torque))
+        found += self._flanks.feed(time, torque)
+        if self._limited_torque:
+            found += self._saturation.feed(time, np.abs(state["motor_torque"]))
+        if "engaged_share" in state:
+            found += self._idle.feed(time, -state["engaged_share"])
+            if self._share is not None:
+                found += self._share.feed(time, state["engaged_share"])
+        if exchanged > 0:
+            found += self._doubt.feed(time, np.abs(state["energy_residual"]) / exchanged)
+        if self._force is not None and "teeth" in tables:
+            teeth = tables["teeth"]
+            found += self._force.feed(teeth.time, np.abs(teeth["normal_force"]).max(axis=1))
+        return self._limited(sorted(found, key=lambda event: event.time))
+
+    def finish(self, time: float, failure: str | None) -> list[Event]:
+        """The last events: what was not told singly, and the end.
+
+        Args:
+            time: time that was reached, s.
+            failure: why the run stopped early, or None.
+        """
+        found = [
+            Event(
+                time, count.level, source, f"{count.untold} more times: {kind} (last at {count.last:.6g} s)"
+            )
+            for (source, kind), count in self._counts.items()
+            if count.untold
+        ]
+        if failure is None:
+            found.append(Event(time, "info", "run", "run ends"))
+        return found
+
+    def _phases(self, state: Table) -> list[Event]:
+        """Moves and dwells of the commanded motion."""
+        if "reference_angle" in state:
+            angle = state["reference_angle"]
+        elif "motor" in self.model.motions:
+            angle = state["motor_angle"] / self.model.ratio
+        else:
+            return []
+        time = state.time
+        first = (float(time[0]), float(angle[0])) if self._reference is None else self._reference
+        times, angles = np.append(first[0], time), np.append(first[1], angle)
+        self._reference = (float(time[-1]), float(angle[-1]))
+        # Trajectories rest to the last bit; the threshold is rounding of their polynomials.
+        moves = np.abs(np.diff(angles)) > 1e-13 * max(1.0, float(np.abs(angles).max()))
+        if len(time) == 1 and times[0] == times[1]:
+            return []
+        if times[0] == times[1]:
+            times, angles, moves = times[1:], angles[1:], moves[1:]
+        found = []
+        for k in np.flatnonzero(
+            np.diff(moves.astype(int), prepend=-1 if self._moving is None else int(self._moving))
+        ):
+            what = "moves" if moves[k] else "rests"
+            where = f"{np.degrees(angles[k]) + 0.0:.6g} deg"
+            found.append(Event(float(times[k]), "info", "command", f"command {what} at {where}"))
+        self._moving = bool(moves[-1])
+        return found
+
+    def _limited(self, events: list[Event]) -> list[Event]:
+        told = []
+        for event in events:
+            kind = " ".join(word for word in event.message.split() if not any(c.isdigit() for c in word))
+            count = self._counts.setdefault((event.source, kind), _Count(level=event.level))
+            count.last = event.time
+            if count.told < MOST:
+                count.told += 1
+                told.append(event)
+            else:
+                count.untold += 1
+        return told
+
+
+def momentary_torque(model: Model) -> float | None:
+    """Momentary peak torque that the maker allows, N m; None where the drive is no catalogue size."""
+    from hdsim.drive.presets import catalogue_figures
+    from hdsim.errors import HdsimError
+
+    if model.drive.preset is None:
+        return None
+    try:
+        figure = catalogue_figures(model.drive.preset).momentary_peak_torque
+    except (HdsimError, KeyError, ValueError):
+        return None
+    return None if figure is None else figure.value
+
+
+def torque_limit(model: Model) -> float:
+    """Torque limit of the motor's controller, N m; infinite for none."""
+    for part in model.parts:
+        limit = getattr(getattr(part, "motor", None), "torque_limit_nm", None)
+        if limit is not None:
+            return float(limit)
+    return float(np.inf)
+
+
+def _crossing(times: Array, values: Array, threshold: float) -> float:
+    """When a straight line between two samples meets the threshold; the later one where it has no slope."""
+    low, high = values
+    if not np.isfinite(low) or low == high:
+        return float(times[1])
+    share = min(max((threshold - low) / (high - low), 0.0), 1.0)
+    return float(times[0] + share * (times[1] - times[0]))

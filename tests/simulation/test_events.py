@@ -1,0 +1,145 @@
+"""Events of runs, and of made-up blocks whose events are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hdsim
+from hdsim.recording import Column, Table
+from hdsim.scenario.model import Scenario
+from hdsim.simulation.events import MOST, EventDetector, Flanks, Watch
+from hdsim.simulation.setup import build_model, build_run
+from hdsim.simulation.solvers import Statistics
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+
+
+def scenario(**load: object) -> Scenario:
+    return Scenario.model_validate(
+        {
+            "drive": {"preset": "csg-20-100"},
+            "command": {"motor": {"type": "locked"}},
+            "load": {"inertia_kg_m2": 0.05, **load},
+            "run": {"duration_s": 1.0, "teeth_rate_hz": 0},
+        }
+    )
+
+
+def test_a_threshold_is_told_once_each_way_however_the_samples_are_cut():
+    time = np.arange(2000) * 1e-3
+    value = np.sin(2 * np.pi * time)
+    whole = list(Watch("x", "warning", "up", "down", 0.5, 0.4).feed(time, value))
+    assert [event.message for event in whole] == ["up", "down", "up", "down"]
+    # sin crosses 0.5 upwards at 1/12 of a turn, and 0.4 downwards after half a turn less asin 0.4.
+    assert whole[0].time == pytest.approx(1 / 12, abs=1e-6)
+    assert whole[1].time == pytest.approx(0.5 - np.arcsin(0.4) / (2 * np.pi), abs=1e-6)
+    watch = Watch("x", "warning", "up", "down", 0.5, 0.4)
+    pieces = [e for k in range(0, 2000, 7) for e in watch.feed(time[k : k + 7], value[k : k + 7])]
+    assert pieces == whole
+
+
+def test_gap_crossings_are_told_however_the_samples_are_cut():
+    time = np.arange(3000) * 1e-3
+    torque = 10 * np.sin(2 * np.pi * time)
+    whole = list(Flanks(1.0).feed(time, torque))
+    assert [round(event.time, 1) for event in whole] == [0.5, 1.0, 1.5, 2.0, 2.5]
+    assert "from the positive to the negative" in whole[0].message
+    # The torque is below a tenth of its amplitude for 2 asin(0.1) / 2 pi s.
+    assert float(whole[0].message.split()[-2]) == pytest.approx(1e3 * 2 * np.arcsin(0.1) / (2 * np.pi), abs=2)
+    flanks = Flanks(1.0)
+    pieces = [e for k in range(0, 3000, 11) for e in flanks.feed(time[k : k + 11], torque[k : k + 11])]
+    assert [e.message for e in pieces] == [e.message for e in whole]
+
+
+def test_rated_and_momentary_torque_are_told_of_a_catalogue_drive():
+    run = build_run(scenario(torque={"type": "triangle", "amplitude_nm": 200, "frequency_hz": 1}))
+    recording = run.record()
+    told = {e.message: e for e in recording.events if e.source == "drive"}
+    exceeded = [m for m in told if "exceeded" in m]
+    assert any("rated" in m for m in exceeded)
+    assert any("momentary peak" in m for m in exceeded)
+    rated = run.model.rated_torque_nm
+    at = next(e.time for m, e in told.items() if "rated" in m and "exceeded" in m)
+    assert abs(np.interp(at, recording.time, recording["output_torque"])) == pytest.approx(rated, rel=5e-3)
+
+
+def test_moves_and_rests_of_the_command_are_told():
+    run = build_run(hdsim.load_scenario(SCENARIOS / "seed_move.yaml"))
+    events = [e for e in run.record().events if e.source == "command"]
+    assert [e.message for e in events] == [
+        "command rests at 0 deg",
+        "command moves at 0 deg",
+        "command rests at 60 deg",
+    ]
+    assert events[1].time < events[2].time < run.duration_s
+
+
+def test_saturation_is_told():
+    made = scenario().model_dump(mode="json", exclude_unset=True)
+    made["command"] = {
+        "motor": {
+            "type": "position",
+            "torque_limit_nm": 0.2,
+            "trajectory": {"type": "step", "start_time_s": 0.1, "height_deg": 20},
+            "controller": {
+                "type": "cascade",
+                "position_gain_per_s": 20,
+                "velocity_gain_nm_s_per_rad": 0.02,
+                "velocity_integral_gain_nm_per_rad": 0.1,
+            },
+        }
+    }
+    messages = [e.message for e in build_run(Scenario.model_validate(made)).record().events]
+    assert "torque at its limit of 0.2 N m" in messages
+    assert "torque below its limit again" in messages
+
+
+def block(time: np.ndarray, **channels: np.ndarray) -> dict[str, Table]:
+    zero = np.zeros(len(time))
+    names = ("motor_angle", "output_torque", "motor_torque", "energy_residual")
+    columns = dict.fromkeys(names, zero) | channels
+    return {"state": Table(time, {name: Column(values, "1") for name, values in columns.items()})}
+
+
+def test_many_events_of_a_kind_are_counted():
+    detector = EventDetector(build_model(scenario()), 100.0)
+    time = np.arange(100_000) * 1e-3
+    torque = 5 * np.sin(2 * np.pi * time)
+    events = []
+    for k in range(0, len(time), 1000):
+        rows = slice(k, k + 1000)
+        events += detector.feed(block(time[rows], output_torque=torque[rows]), 1.0, Statistics())
+    crossings = [e for e in events if "gap crossed" in e.message]
+    assert len(crossings) == 2 * MOST
+    last = detector.finish(100.0, None)
+    assert [e.message.split(" ")[0] for e in last[:-1]] == [str(100 - MOST), str(99 - MOST)]
+    assert last[-1].message == "run ends"
+
+
+def test_doubts_about_the_solution_are_told():
+    detector = EventDetector(build_model(scenario()), 1.0)
+    time = np.arange(10) * 0.1
+    found = detector.feed(
+        block(time, energy_residual=np.where(time > 0.45, 0.01, 0.0)), 1.0, Statistics(steps=50, rejected=300)
+    )
+    assert {e.message.split(" of the")[0] for e in found if e.source == "solver"} == {
+        "hard to integrate: 300 steps refused, 50 taken up to 0.9 s",
+        "energy audit off by 1.0e-02",
+    }
+
+
+def test_a_force_beyond_the_contact_table_is_told():
+    model = build_model(scenario())
+    assert model.teeth is not None
+    detector = EventDetector(model, 1.0)
+    time = np.arange(4) * 0.1
+    force = np.zeros((4, 3))
+    force[2, 1] = -21 * model.teeth.rated_tooth_force_n
+    tables = block(time) | {"teeth": Table(time, {"normal_force": Column(force, "N")})}
+    found = [e for e in detector.feed(tables, 1.0, Statistics()) if e.source == "contact"]
+    assert len(found) == 1
+    assert "beyond the contact table" in found[0].message
+    assert 0.1 < found[0].time <= 0.2
