@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdsim.errors import InputError
-from hdsim.reproduce import backlash, identification, paper, stiffness
+from hdsim.reproduce import backlash, drive, identification, paper, stiffness
 from hdsim.surface.backlash import single_frequency_half_gap
 from hdsim.surface.flank import Flank
 from hdsim.surface.profile import SAMPLING_LENGTH_M, random_phases, wm_profile
@@ -186,6 +186,73 @@ def second_opinion() -> Figure:
     ax.set_ylabel("K, N/m")
     ax.legend(fontsize=8)
     ax.grid(alpha=0.25, which="both")
+    return figure
+
+
+@_figure(
+    "drive",
+    "What the teeth cost the drive, on the seed-2021 preset (52 N m, ratio 100). Left: play in a torsion "
+    "cycle. "
+    "Middle: turn of the output by the contacts alone at rated torque, where not every asperity is "
+    "plastic. Dashed: other causes of the same drive. "
+    "Right: positioning error under load; bar: change when that cause is switched off, ring: the cause "
+    "alone.",
+    "drive-*",
+)
+def whole_drive() -> Figure:
+    """Play and contact wind-up over D and G beside the drive's other errors, and its error budget."""
+    from hdsim.plot import style
+
+    figure = _new(12.0, 4.2)
+    left, middle, right = figure.subplots(1, 3)
+    colours = (style.BLUE, style.ORANGE, style.GREEN)
+    for G, colour in zip(drive.G_MAP, colours, strict=True):
+        costs = [drive.cost(D, G) for D in drive.D_MAP]
+        play = [max(c.play, 1e-2) for c in costs]
+        left.semilogy(drive.D_MAP, play, "o-", ms=4, color=colour, label=f"G = {G:g} m")
+        middle.semilogy(drive.D_MAP, [c.contact_wind_up for c in costs], "o-", ms=4, color=colour)
+    flank, pair = stiffness.summed(), drive.measured_pair("summed")
+    left.plot(flank.D, pair.play, "k*", ms=11, label="measured pair, summed")
+    middle.plot(flank.D, pair.contact_wind_up, "k*", ms=11)
+    mean = drive.measured_pair("averaged")
+    left.plot(paper.AVERAGED.D, mean.play, "*", ms=11, mec="k", mfc="w", label="measured pair, averaged")
+    middle.plot(paper.AVERAGED.D, mean.contact_wind_up, "*", ms=11, mec="k", mfc="w")
+    whole, bending = drive.wind_up()
+    beside = (
+        (left, drive.without_gap().lost_motion, "elastic lost motion at 3 %", "bottom"),
+        (left, pair.hysteresis_loss, "hysteresis loss", "bottom"),
+        (left, drive.kinematic_error(), "kinematic error", "top"),
+        (middle, whole, "whole drive (cup torsion)", "bottom"),
+        (middle, bending, "bending of the teeth", "bottom"),
+    )
+    edge = drive.D_MAP[-1]
+    left.set_ylim(1e-2, 1e3)
+    middle.set_ylim(top=1.5e3)
+    ends = sorted(value for ax, value, *_ in beside if ax is left)
+    left.axhspan(ends[0], ends[-1], color="0.5", alpha=0.15)
+    for ax, value, name, _ in beside:
+        ax.axhline(value, color="0.4", ls="--", lw=0.9)
+        if ax is middle:
+            ax.text(edge, value, f"{name} {value:.0f}", ha="right", va="bottom", fontsize=8)
+    names = ", ".join(f"{name} {value:.0f}" for ax, value, name, _ in beside if ax is left)
+    left.text(edge, 1.12 * ends[-1], names.replace(", ", "\n"), ha="right", va="bottom", fontsize=8)
+    left.set_ylabel("play at the output, arcsec")
+    middle.set_ylabel("contact wind-up at 52 N m, arcsec")
+    for ax in (left, middle):
+        ax.set_xlabel("D of the pair")
+        ax.grid(alpha=0.25)
+    left.legend(fontsize=8, loc="lower left")
+    found = drive.positioning()
+    at = np.arange(len(found.parts))[::-1]
+    right.barh(at, [part.removed for part in found.parts], color=style.BLUE, height=0.55)
+    right.plot([part.alone for part in found.parts], at, "o", mfc="white", mec=style.ORANGE, ms=7)
+    right.set_yticks(at, [f"{p.cause.title}\n{p.removed:+.1f}" for p in found.parts], fontsize=8)
+    right.set_xscale("symlog", linthresh=1.0)
+    right.axvline(0.0, color="0.4", lw=0.8)
+    right.set_xlim(-3.0 * abs(found.whole), 10.0)
+    right.set_xlabel(f"change of the error of {found.whole:.0f} arcsec, arcsec")
+    right.set_title("positioning under 20 N m", fontsize=9)
+    right.grid(axis="x", alpha=0.25)
     return figure
 
 

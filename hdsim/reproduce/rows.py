@@ -49,6 +49,12 @@ Check = Callable[[], Iterable[Row]]
 
 _CHECKS: dict[str, Check] = {}
 
+#: The paper's order, as patterns of names.
+_ORDER = (
+    "eq-[1-9]", "eq-1[0-8]", "round-trip-*", "resolution", "equivalent-pair", "table-4-*", "fig-[89]",
+    "rule-*", "fig-1*", "eq-21", "stiffness-*", "boundary-element", "drive-*",
+)  # fmt: skip
+
 
 def check(*names: str) -> Callable[[Check], Check]:
     """Register a function that makes the rows of these names."""
@@ -63,9 +69,13 @@ def check(*names: str) -> Callable[[Check], Check]:
 
 def names() -> list[str]:
     """Names of all rows, in the paper's order."""
-    from hdsim.reproduce import backlash, equations, identification, stiffness  # noqa: F401
+    from hdsim.reproduce import backlash, drive, equations, identification, stiffness  # noqa: F401
 
-    return list(_CHECKS)
+    return sorted(_CHECKS, key=_place)
+
+
+def _place(name: str) -> int:
+    return next(k for k, pattern in enumerate(_ORDER) if fnmatch(name, pattern))
 
 
 def compute(only: Iterable[str] = ()) -> list[Row]:
@@ -83,4 +93,4 @@ def compute(only: Iterable[str] = ()) -> list[Row]:
     rows: list[Row] = []
     for function in dict.fromkeys(_CHECKS[name] for name in wanted):
         rows += [row for row in function() if row.name in wanted]
-    return rows
+    return sorted(rows, key=lambda row: wanted.index(row.name))
