@@ -37,7 +37,7 @@ def main(runs: int) -> int:
     few = jobs[: max(40, runs // 20)]
     rates: dict[int, list[float]] = {1: [], 2: []}
     with executor(1) as one, executor(2) as two:
-        for workers, (pool, width) in ((1, one), (2, two)):
+        for pool, width in (one, two):
             # One run each, so that processes and compiled code are there before the clock starts.
             execute(batches(checked.recipe, names, jobs[: 2 * width], width), pool, width, lambda rows: None)
         # In turns, so that whatever else the machine does meets both alike.
