@@ -24,7 +24,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "hdsim.study.commands_engine:tolerance",
         "Find the largest tolerance that meets an accuracy.",
     ),
-    "linearize": ("hdsim.simulation.commands_linear:linearize", "Linearise a drive; its modes and Bode plot."),
+    "linearize": (
+        "hdsim.simulation.commands_linear:linearize",
+        "Linearise a drive; its modes and Bode plot.",
+    ),
+    "reproduce": ("hdsim.reproduce.commands:reproduce", "Recompute every number of the source paper."),
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),
@@ -33,6 +37,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
     "layout": ("hdsim.log.commands:layout", "Print a layout that shows a log in Foxglove."),
+    "diagnose": (
+        "hdsim.diagnose.commands:diagnose",
+        "Find what a model is missing against measured records.",
+    ),
     "recover": ("hdsim.log.commands:recover", "Save what a damaged or unfinished log holds."),
 }
 

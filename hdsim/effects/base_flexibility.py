@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Fitting, Inverse
 from hdsim.parts import Builder, Effect, Signature
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class BaseFlexibility(Effect):
             " scatters by 30 %)",
         },
     )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Inverse("stiffness_nm_per_rad", 5.0e5),)),)
 
     stiffness_nm_per_rad: float = Field(5.0e5, gt=0)
     """Torsional stiffness K_b of the mount about the drive's axis, N m/rad."""

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.effects._kernels import ARCMIN
 from hdsim.kernel import twist
 from hdsim.parts import Builder, Effect, Signature
@@ -53,6 +54,13 @@ class DamagedTooth(Effect):
             "sensors": "a fault of an encoder's disc repeats once per turn of its own shaft and leaves no "
             "torque",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"amplitude_arcmin": 0.2}, signed=True),),
+            shapes=(Shape("position_deg", (15.0, 45.0, 75.0, 105.0, 135.0, 165.0)),),
+            settings={"width_deg": 15.0},
+        ),
     )
 
     amplitude_arcmin: float = -0.2

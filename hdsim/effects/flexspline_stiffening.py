@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Fitting, Inverse, Shape
 from hdsim.parts import Builder, Effect, Signature
 
 if TYPE_CHECKING:
@@ -32,6 +33,9 @@ class FlexsplineStiffening(Effect):
             "shows hysteresis when the motor turns",
             "output_backlash": "no stiffness at all over a fixed gap, gone under a bias torque",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Inverse("stiffness_nm_per_rad", 1.0e5),), (Shape("coefficient_per_nm", (0.02, 0.08)),)),
     )
 
     stiffness_nm_per_rad: float = Field(1.0e5, gt=0)

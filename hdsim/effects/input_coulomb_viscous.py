@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects._kernels import coulomb_viscous
 from hdsim.kernel import MOTOR_TORQUE
 from hdsim.parts import Builder, Effect, Signature
@@ -30,6 +31,9 @@ class InputCoulombViscous(Effect):
             "torsional_hysteresis_maxwell": "a cycle with the wave generator locked excludes friction on "
             "the input",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Amplitude({"coulomb_nm": 0.032}), Amplitude({"viscous_nm_s_per_rad": 3.5e-4}))),
     )
 
     coulomb_nm: float = Field(0.032, ge=0)

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.effects._kernels import ARCMIN, harmonics
 from hdsim.parts import Builder, Effect, Parameters, Signature
 
@@ -84,6 +85,21 @@ class KinematicError(Effect):
             "the ratio",
             "damaged_tooth": "a short bump: many harmonics of one pass, in a narrow range of angle",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            tuple(
+                Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.1)
+                for k in range(3)
+            ),
+            settings={
+                "components": [
+                    {"order": 2, "per": "wave_generator_turn"},
+                    {"order": 2, "per": "relative_turn"},
+                    {"order": 4, "per": "wave_generator_turn"},
+                ]
+            },
+        ),
     )
 
     components: tuple[ErrorComponent, ...] = Field(default_factory=_default_components, min_length=1)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, TRANSMITTED_TORQUE, element
 from hdsim.parts import Builder, Effect, Signature
 
@@ -48,6 +49,7 @@ class LoadDependentLoss(Effect):
             "torsional_hysteresis_maxwell": "absent with the wave generator locked",
         },
     )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Amplitude({"coefficient": 0.03}),)),)
 
     coefficient: float = Field(0.03, ge=0, lt=1)
     """Share of the transmitted torque, reduced to the motor, that is lost on top of the drive's own, c_L."""

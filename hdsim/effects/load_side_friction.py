@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects._kernels import coulomb_viscous
 from hdsim.kernel import OUTPUT_TORQUE
 from hdsim.parts import Builder, Effect, Signature
@@ -29,6 +30,9 @@ class LoadSideFriction(Effect):
             "ring it is absent; behind the torque sensor it shows as a "
             "difference of sensor and load torque",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Amplitude({"coulomb_nm": 1.0}), Amplitude({"viscous_nm_s_per_rad": 0.5}))),
     )
 
     coulomb_nm: float = Field(1.0, ge=0)

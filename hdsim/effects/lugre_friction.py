@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field, model_validator
 
+from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, STORED, element
 from hdsim.parts import Builder, Effect, Signature, State
 
@@ -76,6 +77,13 @@ class LugreFriction(Effect):
             "with the motor's displacement, not with the twist",
             "output_backlash": "the free play there carries no torque at all, the presliding zone a spring's",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"coulomb_nm": 0.02, "static_nm": 0.03, "stiffness_nm_per_rad": 5.0}),),
+            (Shape("stribeck_velocity_rad_per_s", (2.0, 8.0)),),
+            {"damping_nm_s_per_rad": 1e-3},
+        ),
     )
 
     stiffness_nm_per_rad: float = Field(10.0, gt=0)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Fitting, Periodic
 from hdsim.kernel import (
     MOTOR_ANGLE,
     MOTOR_TORQUE,
@@ -78,6 +79,9 @@ class MotorTorqueRipple(Effect):
             " re-clocked",
             "sensors": "a ripple of the torque sensor is not felt by either encoder",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Periodic("components", "cogging_nm", 0.005, "motor_torque"),), label="cogging"),
     )
 
     components: tuple[RippleComponent, ...] = Field(

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects._kernels import ARCMIN
 from hdsim.parts import Builder, Effect, Signature
 
@@ -31,6 +32,7 @@ class OutputBacklash(Effect):
             "segment",
         },
     )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Amplitude({"backlash_arcmin": 0.3}),)),)
 
     backlash_arcmin: float = Field(0.15, ge=0)
     """Additional total play at the output, arcmin."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.effects._kernels import harmonics
 from hdsim.parts import Builder, Effect, Signature
 
@@ -27,6 +28,7 @@ class OutputEccentricity(Effect):
             "kinematic_error": "its order 1 per output turn is the same trace: one of the two is enough",
         },
     )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Harmonic("eccentricity_um", "phase_deg", 2.0),)),)
 
     eccentricity_um: float = Field(2.0, ge=0)
     """Run-out (offset of the centres) d, um."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Periodic
 from hdsim.effects._kernels import ARCMIN
 from hdsim.parts import Builder, Effect, Parameters, Signature
 
@@ -115,6 +116,23 @@ class Sensors(Effect):
             " delay turns the phase of order k by k w t_d without a change of "
             "amplitude",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Harmonic("output_angle.eccentricity_arcmin", "output_angle.eccentricity_phase_deg", 0.2),),
+            label="output encoder eccentricity",
+            needs=("output_angle",),
+        ),
+        Fitting(
+            (Amplitude({"output_angle.delay_s": 5e-4}),),
+            label="output encoder delay",
+            needs=("output_angle",),
+        ),
+        Fitting(
+            (Periodic("output_torque.ripple", "amplitude_nm", 0.1, "output_torque"),),
+            label="torque-sensor ripple",
+            needs=("output_torque",),
+        ),
     )
 
     motor_angle: Encoder | None = None

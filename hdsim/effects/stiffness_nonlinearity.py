@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.kernel import STORED, TWIST, TWIST_TORQUE, element
 from hdsim.parts import Builder, Effect, Signature
 
@@ -38,6 +39,7 @@ class StiffnessNonlinearity(Effect):
             "wave_generator_compliance": "stiffens exponentially, most below half of rated torque",
         },
     )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Amplitude({"cubic_nm_per_rad3": 3.0e8}),)),)
 
     cubic_nm_per_rad3: float = Field(3.0e8, ge=0)
     """Cubic stiffness k_3 at the output, N m/rad^3."""

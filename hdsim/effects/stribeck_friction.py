@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, element
 from hdsim.parts import Builder, Effect, Signature
 
@@ -44,6 +45,12 @@ class StribeckFriction(Effect):
             "input_coulomb_viscous": "friction there never falls with speed, so slow motion does not stick "
             "and slip",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"extra_static_nm": 0.008}),),
+            (Shape("stribeck_velocity_rad_per_s", (1.5, 5.0, 20.0)),),
+        ),
     )
 
     extra_static_nm: float = Field(0.008, ge=0)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, element
 from hdsim.parts import Builder, Effect, Signature, State
 
@@ -61,6 +62,12 @@ class ThermalFriction(Effect):
             "minutes to an hour and collapses on exp(-beta dT)",
             "sensors": "a sensor's offset leaves the friction's dependence on speed alone",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"viscosity_coefficient_per_k": 0.033}, signed=False),),
+            (Shape("heat_capacity_j_per_k", (5.0, 450.0)),),
+        ),
     )
 
     heat_capacity_j_per_k: float = Field(450.0, gt=0)

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
 from hdsim.parts import Builder, Effect, Signature, State
 
@@ -53,6 +54,10 @@ class TorsionalHysteresisDuhem(Effect):
             "under a bias",
             "input_coulomb_viscous": "absent with the wave generator locked",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = tuple(
+        Fitting((Amplitude({"stiffness_nm_per_rad": 1e3 / twist, "saturation_torque_nm": 1.0}),))
+        for twist in (0.1, 0.4)
     )
 
     stiffness_nm_per_rad: float = Field(5000.0, gt=0)

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field, model_validator
 
+from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
 from hdsim.parts import Builder, Effect, Parameters, Signature, State
 
@@ -74,6 +75,10 @@ class TorsionalHysteresisMaxwell(Effect):
             "input_coulomb_viscous": "absent with the wave generator locked",
             "lugre_friction": "absent with the wave generator locked",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = tuple(
+        Fitting((Amplitude({"slip_torque_nm": 1.0}),), settings={"slip_twists_mrad": twists})
+        for twists in ([0.05, 0.15, 0.4], [0.1, 0.3, 0.8])
     )
 
     elements: tuple[SlipElement, ...] | None = Field(None, min_length=1)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.kernel import MOTOR_TORQUE, OUTPUT_TORQUE, STORED, element
 from hdsim.parts import Builder, Effect, Signature
 
@@ -42,6 +43,12 @@ class Unbalance(Effect):
             "not",
             "sensors": "an eccentric encoder leaves no torque",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Harmonic("output_kg_m", "output_phase_deg", 0.1),), label="output"),
+        Fitting(
+            (Harmonic("motor_kg_m", "motor_phase_deg", 1e-3),), settings={"output_kg_m": 0.0}, label="motor"
+        ),
     )
 
     output_kg_m: float = Field(0.1, ge=0)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Fitting, Inverse, Shape
 from hdsim.parts import Builder, Effect, Signature
 
 if TYPE_CHECKING:
@@ -34,6 +35,9 @@ class WaveGeneratorCompliance(Effect):
             "stiffness_nonlinearity": "stiffens with the square of twist",
             "output_backlash": "no stiffness at all over a fixed gap, gone under a bias torque",
         },
+    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Inverse("stiffness_nm_per_rad", 8.0),), (Shape("coefficient_per_nm", (0.5, 2.0, 8.0)),)),
     )
 
     stiffness_nm_per_rad: float = Field(8.0, gt=0)

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.effects._kernels import harmonics
 from hdsim.parts import Builder, Effect, Signature
 
@@ -37,6 +38,7 @@ class WaveGeneratorEccentricity(Effect):
             "kinematic_error": "the dominant order is 2",
         },
     )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Harmonic("eccentricity_um", "phase_deg", 10.0),)),)
 
     eccentricity_um: float = Field(10.0, ge=0)
     """Offset d of the axes of wave generator and fixed spline, um."""

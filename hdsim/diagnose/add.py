@@ -1,0 +1,126 @@
+"""Step 6, add: a scenario that extends the base with what was found, and runs like any other."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hdsim.diagnose.freedom import Added, Free, State, merge, put
+from hdsim.diagnose.measured import Array
+from hdsim.diagnose.verdict import FittedNumber
+from hdsim.effects._fitting import Amplitude, Harmonic, Inverse
+
+
+def scenario_text(base: Path, state: State, freedoms: Sequence[Free], start: State, beside: Path) -> str:
+    """YAML of the scenario.
+
+    Args:
+        base: file of the base scenario.
+        state: the fitted model.
+        freedoms: the base's numbers as they were.
+        start: the base model.
+        beside: the directory in which the scenario will stand.
+    """
+    from hdsim.scenario.writer import to_yaml
+
+    data: dict[str, Any] = {
+        "name": f"{base.stem} with what was found"[:200],
+        "description": "Written by a diagnosis: the base, its numbers fitted to measured data, and effects.",
+        "extends": os.path.relpath(base, beside),
+    }
+    for free in freedoms:
+        for path in free.paths:
+            if path == "gain":
+                continue
+            new, old = _number(state, path), _number(start, path)
+            if new is not None and old is not None and new != old:
+                put(data, path, _rounded(new))
+    effects: dict[str, Any] = {}
+    for added in state.added:
+        merge(effects.setdefault(added.effect, {}), _all_rounded(added.settings()))
+    if abs(state.gain - 1.0) > 1e-9:
+        put(effects, "sensors.motor_torque.gain_error", _rounded(state.gain - 1.0))
+    if effects:
+        merge(data.setdefault("effects", {}), effects)
+    return to_yaml(data)
+
+
+def _number(state: State, path: str) -> float | None:
+    section, _, rest = path.partition(".")
+    here: Any = {"drive": state.drive, "load": state.load, "effects": state.effects}[section]
+    for key in rest.split("."):
+        here = here[key] if isinstance(here, dict) else getattr(here, key)
+    return float(here) if here is not None else None
+
+
+def fitted_numbers(added: Added, covariance: Array, shape_spreads: Array) -> dict[str, FittedNumber]:
+    """An effect's fitted fields with 95 % intervals.
+
+    Args:
+        added: the fitted effect.
+        covariance: of its coefficients.
+        shape_spreads: standard deviations of the logarithms of its shapes.
+    """
+    found: dict[str, FittedNumber] = {}
+    at = 0
+    c = added.coefficients
+    spread = 2.0 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+    def harmonic(amplitude: str, phase: str, unit: float) -> None:
+        nonlocal at
+        a, b = c[at], c[at + 1]
+        size = math.hypot(a, b)
+        part = covariance[at : at + 2, at : at + 2]
+        along = np.array([a, b]) / max(size, 1e-12)
+        across = np.array([-b, a]) / max(size, 1e-12)
+        half = 2.0 * math.sqrt(max(float(along @ part @ along), 0.0))
+        found[amplitude] = _value(unit * size, unit * max(size - half, 0.0), unit * (size + half))
+        angle = math.degrees(math.atan2(b, a))
+        wide = math.degrees(2.0 * math.sqrt(max(float(across @ part @ across), 0.0)) / max(size, 1e-12))
+        found[phase] = _value(angle, angle - wide, angle + wide)
+        at += 2
+
+    for term in added.fitting.terms:
+        if isinstance(term, Amplitude):
+            for path, unit in term.units.items():
+                low = c[at] - spread[at] if term.signed else max(c[at] - spread[at], 0.0)
+                found[path] = _value(unit * c[at], unit * low, unit * (c[at] + spread[at]))
+            at += 1
+        elif isinstance(term, Inverse):
+            low, high = max(c[at] - spread[at], 1e-9), c[at] + spread[at]
+            found[term.path] = _value(term.unit / max(c[at], 1e-9), term.unit / high, term.unit / low)
+            at += 1
+        elif isinstance(term, Harmonic):
+            harmonic(term.amplitude, term.phase, term.unit)
+        else:
+            for k, order in enumerate(added.orders):
+                path = f"{term.section}.{k}"
+                found[f"{path}.order"] = FittedNumber(value=order)
+                harmonic(f"{path}.{term.amplitude}", f"{path}.phase_deg", term.unit)
+    for shape, value, deviation in zip(added.fitting.shapes, added.shapes, shape_spreads, strict=True):
+        factor = math.exp(min(2.0 * float(deviation), 20.0))
+        found[shape.path] = _value(value, value / factor, value * factor)
+    return found
+
+
+def _value(value: float, low: float, high: float) -> FittedNumber:
+    return FittedNumber(value=value, interval=(low, high))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _all_rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return _rounded(value)
+    if isinstance(value, dict):
+        return {key: _all_rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_all_rounded(item) for item in value]
+    return value

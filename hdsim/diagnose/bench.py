@@ -1,0 +1,157 @@
+"""The measured series that models are held against: masks, blocks for cross-validation, held-out parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.diagnose.check import noise_floor
+from hdsim.diagnose.measured import Array, Mask
+from hdsim.diagnose.predict import Candidate, Predictor
+from hdsim.errors import InputError
+
+#: Aimed length of a block, s, and the least and most blocks of a record.
+BLOCK_S = 0.25
+FEWEST_BLOCKS, MOST_BLOCKS = 18, 90
+#: Without a record to hold out, every third of this many stretches of each record is held out.
+STRETCHES = 9
+#: Time at the start of a record that is not compared: the model's own oscillation may not have died away, s.
+SETTLE_S = 0.05
+#: Share of the residual that counts as noise beside the channel's noise, so that a channel with little
+#: noise does not alone decide.
+MODEL_NOISE = 0.1
+
+
+@dataclass
+class Series:
+    """One predicted channel of one record.
+
+    Attributes:
+        record: index of the record's predictor.
+        channel: name of the channel.
+        measured: shape (n,).
+        train: samples that fits may see.
+        hold: samples that only the proof sees.
+        block: shape (n,), number of the block that each sample belongs to, unique over all records.
+        noise: standard deviation of the channel's noise.
+        sigma: standard deviation by which residuals are divided.
+    """
+
+    record: int
+    channel: str
+    measured: Array
+    train: Mask
+    hold: Mask
+    block: NDArray[np.int64]
+    noise: float
+    sigma: float = 1.0
+
+
+class Bench:
+    """Measured records with their predictors.
+
+    Args:
+        training: predictors of the records that fits see.
+        holdout: predictors of records that they don't; empty: parts of the training records are held out.
+    """
+
+    def __init__(self, training: Sequence[Predictor], holdout: Sequence[Predictor] = ()) -> None:
+        self.predictors = [*training, *holdout]
+        self.training = len(training)
+        self.series: list[Series] = []
+        self.blocks = 0
+        for index, predictor in enumerate(self.predictors):
+            self._add(index, predictor, own_record=index >= self.training, split=not holdout)
+        if not any(series.train.any() for series in self.series):
+            raise InputError("no trusted sample is left to fit")
+
+    def _add(self, index: int, predictor: Predictor, *, own_record: bool, split: bool) -> None:
+        record = predictor.record
+        n = len(record.time)
+        count = int(np.clip(record.duration_s / BLOCK_S, FEWEST_BLOCKS, MOST_BLOCKS))
+        block = np.minimum((np.arange(n) * count) // n, count - 1)
+        stretch = (np.arange(n) * STRETCHES) // n
+        held = stretch % 3 == 2 if split else np.full(n, own_record)
+        usable = (record.time > SETTLE_S) & record.trusted[predictor.plan.motion]
+        for channel in predictor.plan.channels:
+            good = usable & record.trusted[channel]
+            measured = record.filled(channel)
+            self.series.append(
+                Series(
+                    index,
+                    channel,
+                    measured,
+                    good & ~held,
+                    good & held,
+                    self.blocks + block,
+                    noise_floor(record.channels[channel], record.trusted[channel]),
+                )
+            )
+        self.blocks += count
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The predicted channels, each once."""
+        return tuple(dict.fromkeys(series.channel for series in self.series))
+
+    def predict(self, candidate: Candidate, gain: float = 1.0, *, everything: bool = False) -> list[Array]:
+        """Predictions of all series; of records that are held out only when ``everything``.
+
+        Args:
+            candidate: the model.
+            gain: sensitivity of the motor torque's reading.
+            everything: predict the held-out records too.
+        """
+        reach = len(self.predictors) if everything else self.training
+        found: list[Mapping[str, Array]] = [p.predict(candidate) for p in self.predictors[:reach]]
+        predictions = []
+        for series in self.series:
+            if series.record >= reach:
+                predictions.append(np.zeros(0))
+                continue
+            values = found[series.record][series.channel]
+            predictions.append(gain * values if series.channel == "motor_torque" else values)
+        return predictions
+
+    def residuals(self, predictions: Sequence[Array]) -> list[Array]:
+        """Measured less predicted, less the mean over the samples that a fit may see (a sensor's offset)."""
+        found = []
+        for series, predicted in zip(self.series, predictions, strict=True):
+            if not len(predicted):
+                found.append(np.zeros(0))
+                continue
+            residual = series.measured - predicted
+            seen = series.train if series.train.any() else series.hold
+            found.append(residual - residual[seen].mean())
+        return found
+
+    def weigh(self, residuals: Sequence[Array]) -> None:
+        """Set every series' ``sigma`` from its noise and from what is left of it."""
+        for series, residual in zip(self.series, residuals, strict=True):
+            rows = series.train
+            if len(residual) and rows.any():
+                rest = float(np.sqrt(np.mean(residual[rows] ** 2)))
+                series.sigma = max(float(np.hypot(series.noise, MODEL_NOISE * rest)), 1e-15)
+
+    def stacked(self, columns: Sequence[Array]) -> Array:
+        """Training samples of all series under one another, divided by their sigma."""
+        return np.concatenate(
+            [
+                column[series.train] / series.sigma
+                for series, column in zip(self.series, columns, strict=True)
+                if len(column)
+            ]
+        )
+
+    def stacked_blocks(self) -> NDArray[np.int64]:
+        """Block of every row of ``stacked``."""
+        return np.concatenate([s.block[s.train] for s in self.series if s.record < self.training])
+
+    def stacked_series(self) -> NDArray[np.int64]:
+        """Number of the series of every row of ``stacked``."""
+        return np.concatenate(
+            [np.full(int(s.train.sum()), k) for k, s in enumerate(self.series) if s.record < self.training]
+        )

@@ -1,0 +1,100 @@
+"""``hdsim diagnose``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from hdsim.diagnose.workflow import Diagnosis
+
+_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.command()
+@click.argument("measured", nargs=-1, required=True, type=_FILE)
+@click.option("--model", required=True, type=_FILE, help="Scenario of the model.")
+@click.option("--mapping", type=_FILE, help="What the columns mean; a log of hdsim needs none.")
+@click.option("--holdout", multiple=True, type=_FILE, help="Records that only the proof sees.")
+@click.option(
+    "--out", required=True, type=click.Path(file_okay=False, path_type=Path), help="Where to write."
+)
+@click.option(
+    "--load",
+    type=click.Choice(["scenario", "load_torque", "output_torque"]),
+    help="Where the load's torque comes from [load_torque when measured, else scenario].",
+)
+@click.option("--force", is_flag=True, help="Go on in spite of errors in the data.")
+def diagnose(
+    measured: tuple[Path, ...],
+    model: Path,
+    mapping: Path | None,
+    holdout: tuple[Path, ...],
+    out: Path,
+    load: Any,
+    force: bool,
+) -> int:
+    """Find what a model is missing against measured records.
+
+    Checks the data, compares, fits the model's own numbers, locates what is left, names effects of the
+    catalogue, adds them, and proves it on data that no fit has seen.
+    """
+    import hdsim
+    from hdsim.diagnose.measured import record_from
+    from hdsim.diagnose.workflow import diagnose as run
+    from hdsim.diagnose.workflow import save
+
+    scenario = hdsim.load_scenario(model)
+    records, held = (
+        [record_from(hdsim.import_recording(path, mapping), path.name) for path in paths]
+        for paths in (measured, holdout)
+    )
+    with _Progress() as tell:
+        found = run(records, scenario, holdout=held, load=load, force=force, on_step=tell)
+        tell("writing the report")
+        report = save(found, model, out)
+    show(found)
+    click.echo(f"report   {report}")
+    if found.verdict.scenario:
+        click.echo(f"scenario {found.verdict.scenario}")
+    return 0
+
+
+def show(found: Diagnosis) -> None:
+    """Print the verdict and the gap table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from hdsim.diagnose.report import GAP_HEAD, gap_rows
+
+    verdict = found.verdict
+    console = Console()
+    console.print(f"[bold]{verdict.verdict}[/bold]  {verdict.sentence}", highlight=False)
+    table = Table(*GAP_HEAD, title="RMS difference on held-out data", title_justify="left")
+    for row in gap_rows(verdict):
+        table.add_row(*row)
+    console.print(table)
+    for problem in verdict.data_problems:
+        if problem.severity != "info":
+            line = f"{problem.severity}: {problem.record}: {problem.channel}: {problem.message}"
+            console.print(line, highlight=False, markup=False)
+
+
+class _Progress:
+    """A line that says what is being done, on a terminal; nothing elsewhere."""
+
+    def __enter__(self) -> Any:
+        from rich.console import Console
+
+        console = Console(stderr=True)
+        self._status = console.status("") if console.is_terminal else None
+        if self._status is None:
+            return lambda text: None
+        self._status.start()
+        return self._status.update
+
+    def __exit__(self, *_: object) -> None:
+        if self._status is not None:
+            self._status.stop()

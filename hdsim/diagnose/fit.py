@@ -1,0 +1,360 @@
+"""Output-error fits: a model's numbers by non-linear least squares on the predicted channels, with intervals.
+
+The Jacobian is made of finite differences whose step is large against the solver's noise. Residuals of a
+model are correlated in time, so the covariance is the cluster-robust one over blocks of time (Liang and
+Zeger 1986, Biometrika 73:13), and the fit weighs the data by the number of independent samples that they
+are worth. Every number has a prior spread: what the data say less about than that stays where it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.freedom import Added, Free, Interval, State, scaled, signed
+from hdsim.diagnose.measured import Array
+from hdsim.diagnose.predict import PredictionError
+
+#: Step of finite differences in the logarithm of a number.
+STEP = 1e-2
+#: Prior spreads of an effect's coefficients (in units of their terms) and of the logarithm of its shapes.
+COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
+#: Ratio of posterior to prior spread above which the data are said not to determine a number.
+UNDETERMINED = 0.5
+#: Evaluations of the residual in one fit, Jacobians aside.
+EVALUATIONS = 8
+
+
+@dataclass
+class Fit:
+    """A fitted model.
+
+    Attributes:
+        state: the model with its fitted numbers.
+        frees: the numbers of the base that were free.
+        theta: logarithms of their factors, shape (f,).
+        covariance: of all free numbers, shape (p, p).
+        predictions: of the training records.
+        columns: sensitivities of the predictions to every free number, whitened, shape (rows, p).
+        undetermined: numbers that were left where they were, because the data do not determine them.
+        ties: for each undetermined number, those that it cannot be told from.
+    """
+
+    state: State
+    frees: list[Free]
+    theta: Array
+    covariance: Array
+    predictions: list[Array]
+    columns: Array
+    undetermined: list[Free]
+    ties: dict[str, list[str]]
+
+
+@dataclass(frozen=True)
+class _Vector:
+    """The free numbers as one vector: logarithms, then coefficients and logarithms of shapes of effects."""
+
+    base: State
+    frees: tuple[Free, ...]
+    first: int  # effects before this one are held fixed
+
+    def start(self, theta: Mapping[str, float] | None = None) -> Array:
+        values = [(theta or {}).get(free.name, 0.0) for free in self.frees]
+        for added in self.base.added[self.first :]:
+            values += [*added.coefficients, *(math.log(shape) for shape in added.shapes)]
+        return np.array(values)
+
+    def state(self, x: Array) -> State:
+        state = scaled(self.base, self.frees, x[: len(self.frees)].tolist())
+        at = len(self.frees)
+        effects = list(self.base.added[: self.first])
+        for added in self.base.added[self.first :]:
+            coefficients = tuple(float(v) for v in x[at : at + len(added.coefficients)])
+            at += len(coefficients)
+            shapes = tuple(math.exp(float(v)) for v in x[at : at + len(added.shapes)])
+            at += len(shapes)
+            effects.append(replace(added, coefficients=coefficients, shapes=shapes))
+        return replace(state, added=tuple(effects))
+
+    def priors(self) -> Array:
+        spreads = [free.prior for free in self.frees]
+        for added in self.base.added[self.first :]:
+            spreads += [COEFFICIENT_PRIOR] * len(added.coefficients) + [SHAPE_PRIOR] * len(added.shapes)
+        return np.array(spreads)
+
+    def lower(self) -> Array:
+        bounds = [-3.0] * len(self.frees)
+        for added in self.base.added[self.first :]:
+            bounds += [-math.inf if s else 0.0 for s in signed(added.fitting, len(added.orders))]
+            bounds += [math.log(shape) - 3.0 for shape in added.shapes]
+        return np.array(bounds)
+
+    def upper(self) -> Array:
+        bounds = [3.0] * len(self.frees)
+        for added in self.base.added[self.first :]:
+            bounds += [math.inf] * len(added.coefficients)
+            bounds += [math.log(shape) + 3.0 for shape in added.shapes]
+        return np.array(bounds)
+
+    def steps(self, x: Array) -> Array:
+        steps = [STEP] * len(self.frees)
+        at = len(self.frees)
+        for added in self.base.added[self.first :]:
+            steps += [max(0.03, 0.03 * abs(v)) for v in x[at : at + len(added.coefficients)]]
+            steps += [5 * STEP] * len(added.shapes)
+            at += len(added.coefficients) + len(added.shapes)
+        return np.array(steps)
+
+
+def fit(
+    bench: Bench,
+    state: State,
+    frees: Sequence[Free],
+    *,
+    held_effects: int = 0,
+    evaluations: int = EVALUATIONS,
+    prune: bool = True,
+    theta: Mapping[str, float] | None = None,
+) -> Fit:
+    """Fit a model to the training data.
+
+    Args:
+        bench: the measured series, weighed.
+        state: the model to start from.
+        frees: numbers of the base that may move.
+        held_effects: that many of the first added effects stay as they are.
+        evaluations: residuals that the optimiser may ask for.
+        prune: leave numbers that the data do not determine where they are.
+        theta: where the logarithms of the base's factors start, by name; 0 by default.
+
+    Raises:
+        PredictionError: the start itself could not be predicted.
+    """
+    from scipy.optimize import least_squares
+
+    blocks = bench.stacked_blocks()
+    chosen = list(frees)
+    undetermined: list[Free] = []
+    ties: dict[str, list[str]] = {}
+    if prune and chosen:
+        chosen, undetermined, ties = _determined(bench, state, chosen, held_effects, blocks, theta)
+    vector = _Vector(state, tuple(chosen), held_effects)
+    x0 = vector.start(theta)
+    first = vector.state(x0)
+    start = _stacked(bench, bench.predict(first.candidate(), first.gain))
+    if len(x0) == 0:
+        predictions = bench.predict(state.candidate(), state.gain)
+        empty = np.zeros((len(start), 0))
+        return Fit(state, [], x0, np.zeros((0, 0)), predictions, empty, undetermined, ties)
+    worth = 1.0 / math.sqrt(_correlation(start, blocks) * max(float(np.mean(start**2)), 1e-30))
+    priors, centre = vector.priors(), vector.start()
+    centre[len(chosen) :] = np.where(
+        np.isfinite(vector.lower()[len(chosen) :]) & (priors[len(chosen) :] == SHAPE_PRIOR),
+        x0[len(chosen) :],
+        0.0,
+    )
+
+    def residual(x: Array) -> Array:
+        try:
+            moved = vector.state(x)
+            rest = _stacked(bench, bench.predict(moved.candidate(), moved.gain))
+        except PredictionError:
+            rest = 10.0 * start
+        return np.concatenate([worth * rest, (x - centre) / priors])
+
+    def jacobian(x: Array) -> Array:
+        columns = sensitivities(bench, vector, x)
+        return np.vstack([-worth * columns, np.diag(1.0 / priors)])
+
+    lower, upper = vector.lower(), vector.upper()
+    inside = np.clip(x0, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+    found = least_squares(
+        residual,
+        inside,
+        jac=jacobian,
+        bounds=(lower, upper),
+        method="trf",
+        x_scale="jac",
+        ftol=3e-4,
+        xtol=1e-4,
+        gtol=1e-10,
+        max_nfev=evaluations,
+    )
+    rows = len(start)
+    columns = -found.jac[:rows] / worth
+    rest = found.fun[:rows] / worth
+    fitted = vector.state(found.x)
+    predictions = bench.predict(fitted.candidate(), fitted.gain)
+    covariance = robust_covariance(columns, rest, blocks, priors)
+    factors = found.x[: len(chosen)]
+    return Fit(fitted, chosen, factors, covariance, predictions, columns, undetermined, ties)
+
+
+def sensitivities(bench: Bench, vector: _Vector, x: Array) -> Array:
+    """Derivatives of the whitened predictions, offsets removed, shape (rows, p)."""
+    moved = vector.state(x)
+    base = bench.predict(moved.candidate(), moved.gain)
+    columns = []
+    for k, step in enumerate(vector.steps(x)):
+        shifted = x.copy()
+        shifted[k] += step
+        state = vector.state(shifted)
+        try:
+            there = bench.predict(state.candidate(), state.gain)
+        except PredictionError:
+            columns.append(
+                np.zeros(int(sum(s.train.sum() for s in bench.series if s.record < bench.training)))
+            )
+            continue
+        columns.append(trace(bench, base, there) / step)
+    return np.column_stack(columns) if columns else np.zeros((len(bench.stacked_blocks()), 0))
+
+
+def trace(bench: Bench, base: Sequence[Array], there: Sequence[Array]) -> Array:
+    """Whitened difference of two sets of predictions, offsets removed, shape (rows,)."""
+    differences = []
+    for series, a, b in zip(bench.series, base, there, strict=True):
+        if not len(a):
+            differences.append(np.zeros(0))
+            continue
+        change = b - a
+        differences.append(change - change[series.train].mean() if series.train.any() else change)
+    return bench.stacked(differences)
+
+
+def _stacked(bench: Bench, predictions: Sequence[Array]) -> Array:
+    return bench.stacked(bench.residuals(predictions))
+
+
+def _correlation(rest: Array, blocks: NDArray[np.int64]) -> float:
+    """Samples for which one independent sample counts: variance of block sums over that of white noise."""
+    sums = np.bincount(blocks, rest)
+    counts = np.bincount(blocks)
+    used = counts > 0
+    power = float(np.mean(rest**2))
+    if power <= 0:
+        return 1.0
+    ratio = float(np.mean(sums[used] ** 2 / counts[used])) / power
+    return float(np.clip(ratio, 1.0, counts[used].mean()))
+
+
+def robust_covariance(columns: Array, rest: Array, blocks: NDArray[np.int64], priors: Array) -> Array:
+    """Covariance of the free numbers, clusters being blocks of time, shape (p, p)."""
+    p = columns.shape[1]
+    count = int(blocks.max()) + 1
+    scores = np.zeros((count, p))
+    for k in range(p):
+        scores[:, k] = np.bincount(blocks, columns[:, k] * rest, count)
+    used = int((np.bincount(blocks, minlength=count) > 0).sum())
+    power = max(float(np.mean(rest**2)), 1e-30)
+    information = columns.T @ columns
+    # The prior keeps a direction that the data say nothing about from having no spread at all.
+    bread = np.linalg.inv(information + np.diag(power / priors**2))
+    meat = scores.T @ scores * used / max(used - p, 1)
+    # Few blocks can make the clustered spread too small by chance: white noise is its least.
+    meat = meat + power * np.diag(power / priors**2)
+    clustered = bread @ meat @ bread
+    white = power * bread
+    low = np.maximum(1.0, np.sqrt(np.diag(white) / np.maximum(np.diag(clustered), 1e-300)))
+    return np.asarray(clustered * np.outer(low, low))
+
+
+def _determined(
+    bench: Bench,
+    state: State,
+    frees: list[Free],
+    held_effects: int,
+    blocks: NDArray[np.int64],
+    theta: Mapping[str, float] | None,
+) -> tuple[list[Free], list[Free], dict[str, list[str]]]:
+    """Split the numbers into those that the data determine and the others, with what each is tied to.
+
+    The scaled Jacobian's singular values say how many directions the data see; the number with the largest
+    share in an unseen one is dropped, one after the other.
+    """
+    vector = _Vector(state, tuple(frees), held_effects)
+    x0 = vector.start(theta)
+    columns = sensitivities(bench, vector, x0)
+    first = vector.state(x0)
+    rest = _stacked(bench, bench.predict(first.candidate(), first.gain))
+    power = max(float(np.mean(rest**2)), 1e-30) * _correlation(rest, blocks)
+    priors = vector.priors()
+    kept = list(range(len(frees)))
+    others = list(range(len(frees), columns.shape[1]))
+    dropped: list[Free] = []
+    ties: dict[str, list[str]] = {}
+    while kept:
+        use = kept + others
+        scaled_columns = columns[:, use] * priors[use] / math.sqrt(power)
+        _, singular, directions = np.linalg.svd(np.linalg.qr(scaled_columns, mode="r"))
+        spread = (directions**2 / (1.0 + singular[:, None] ** 2)).sum(axis=0)[: len(kept)]
+        worst = int(np.argmax(spread))
+        if math.sqrt(spread[worst]) <= UNDETERMINED:
+            break
+        weakest = directions[-1]
+        free = frees[kept[worst]]
+        dropped.append(free)
+        ties[free.name] = [
+            frees[kept[k]].name
+            for k in range(len(kept))
+            if k != worst and abs(weakest[k]) > 0.3 and np.linalg.norm(scaled_columns[:, worst]) > 2
+        ]
+        kept.pop(worst)
+    return [frees[k] for k in kept], dropped, ties
+
+
+def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
+    """The base's numbers with 95 % intervals; those that were left alone are marked undetermined.
+
+    Args:
+        found: the fit.
+        starts: the numbers as they were before anything was fitted.
+    """
+    first = {free.name: free.value for free in starts}
+    intervals = []
+    for k, free in enumerate(found.frees):
+        value = free.value * math.exp(found.theta[k])
+        spread = 2.0 * math.sqrt(found.covariance[k, k])
+        intervals.append(
+            Interval(
+                free.name,
+                value,
+                first.get(free.name, free.value),
+                value * math.exp(-spread),
+                value * math.exp(spread),
+                free.unit,
+            )
+        )
+    for free in found.undetermined:
+        start = first.get(free.name, free.value)
+        intervals.append(
+            Interval(
+                free.name,
+                free.value,
+                start,
+                math.nan,
+                math.nan,
+                free.unit,
+                False,
+                found.ties.get(free.name, []),
+            )
+        )
+    return intervals
+
+
+def added_spreads(found: Fit, held_effects: int = 0) -> list[tuple[Added, Array, Array]]:
+    """Each fitted effect with covariance of its coefficients and standard deviations of log shapes."""
+    at = len(found.frees)
+    result = []
+    for added in found.state.added[held_effects:]:
+        c, s = len(added.coefficients), len(added.shapes)
+        covariance = found.covariance[at : at + c, at : at + c]
+        shapes = np.sqrt(np.diag(found.covariance)[at + c : at + c + s])
+        result.append((added, covariance, shapes))
+        at += c + s
+    return result

@@ -1,0 +1,282 @@
+"""What a fit may change: numbers that the base model has, and coefficients of an effect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ValidationError
+
+from hdsim.diagnose.predict import Candidate, PredictionError
+from hdsim.effects import catalogue
+from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Inverse, Periodic
+
+if TYPE_CHECKING:
+    from hdsim.scenario import Scenario
+
+#: Coefficient below which a compliance in series counts as none.
+STIFF = 1e-6
+
+
+@dataclass(frozen=True)
+class Free:
+    """A number of the base model that a fit may scale: its value is the start times exp(theta).
+
+    Attributes:
+        name: dotted path in the scenario.
+        paths: the numbers that scale together.
+        prior: standard deviation of theta that an engineer would believe before the measurement.
+        value: the start value, of the first path.
+        unit: of the value.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    prior: float
+    value: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect with coefficients: a fitting, its terms' coefficients and its shapes' values.
+
+    Attributes:
+        effect: its name in the catalogue.
+        fitting: how it is fitted.
+        coefficients: one for each column of its terms.
+        shapes: one value for each of its shapes.
+        orders: orders per wave-generator turn of its periodic terms.
+    """
+
+    effect: str
+    fitting: Fitting
+    coefficients: tuple[float, ...]
+    shapes: tuple[float, ...] = ()
+    orders: tuple[float, ...] = ()
+
+    def settings(self) -> dict[str, Any]:
+        """Values of the effect's fields."""
+        data: dict[str, Any] = _copied(self.fitting.settings)
+        for shape, value in zip(self.fitting.shapes, self.shapes, strict=True):
+            put(data, shape.path, value)
+        at = 0
+        c = self.coefficients
+        for term in self.fitting.terms:
+            if isinstance(term, Amplitude):
+                for path, unit in term.units.items():
+                    put(data, path, c[at] * unit)
+                at += 1
+            elif isinstance(term, Inverse):
+                put(data, term.path, term.unit / max(c[at], STIFF))
+                at += 1
+            elif isinstance(term, Harmonic):
+                put(data, term.amplitude, term.unit * math.hypot(c[at], c[at + 1]))
+                put(data, term.phase, math.degrees(math.atan2(c[at + 1], c[at])))
+                at += 2
+            else:
+                items = []
+                for order in self.orders:
+                    item = dict(term.settings) | {"order": order}
+                    item[term.amplitude] = term.unit * math.hypot(c[at], c[at + 1])
+                    item["phase_deg"] = math.degrees(math.atan2(c[at + 1], c[at]))
+                    items.append(item)
+                    at += 2
+                put(data, term.section, items)
+        return data
+
+    def lower(self) -> list[float]:
+        """Least value of each coefficient."""
+        return [-math.inf if free else 0.0 for free in signed(self.fitting, len(self.orders))]
+
+
+def signed(fitting: Fitting, orders: int) -> list[bool]:
+    """Whether each coefficient of a fitting may be negative."""
+    found: list[bool] = []
+    for term in fitting.terms:
+        if isinstance(term, Harmonic):
+            found += [True, True]
+        elif isinstance(term, Periodic):
+            found += [True, True] * orders
+        elif isinstance(term, Amplitude):
+            found.append(term.signed)
+        else:
+            found.append(False)
+    return found
+
+
+@dataclass(frozen=True)
+class State:
+    """A model in the course of a diagnosis.
+
+    Attributes:
+        drive: the drive.
+        load: the load.
+        effects: settings of the effects of the base, by name.
+        added: effects that the diagnosis has added.
+        gain: sensitivity of the motor torque's reading.
+        seed: seed of the model.
+    """
+
+    drive: Any
+    load: Any
+    effects: dict[str, Any]
+    added: tuple[Added, ...] = ()
+    gain: float = 1.0
+    seed: int = 0
+
+    def candidate(self) -> Candidate:
+        """The model to predict with.
+
+        Raises:
+            PredictionError: a coefficient is outside its effect's bounds.
+        """
+        effects = dict(self.effects)
+        known = catalogue()
+        merged: dict[str, dict[str, Any]] = {}
+        for added in self.added:
+            merge(merged.setdefault(added.effect, {}), added.settings())
+        for name, settings in merged.items():
+            if name in effects:
+                settings = merge(effects[name].model_dump(exclude_none=True), settings)
+            try:
+                effects[name] = known[name](**settings)
+            except ValidationError as error:
+                raise PredictionError(str(error)) from None
+        return Candidate(self.drive, effects, self.load, self.seed)
+
+
+def state_of(scenario: Scenario) -> State:
+    """The scenario's model before anything is fitted."""
+    return State(scenario.drive, scenario.load, scenario.effects.active(), (), 1.0, scenario.run.seed)
+
+
+#: Prior standard deviations of the logarithm, by the last part of a path.
+_PRIORS = {
+    "inertia_kg_m2": 0.5,
+    "motor_kg_m2": 0.5,
+    "mass_kg": 0.4,
+    "coulomb_nm": 0.7,
+    "viscous_nm_s_per_rad": 0.7,
+    "load_coefficient": 0.7,
+    "damping_nm_s_per_rad": 1.0,
+}
+
+
+def base_freedoms(state: State, channels: Sequence[str]) -> list[Free]:
+    """Numbers that the model has and that a fit may move: the zero ones stay zero.
+
+    Args:
+        state: the model.
+        channels: the predicted channels; the torque's sensitivity is free when the motor's torque is one.
+    """
+    drive, load = state.drive, state.load
+    found = [_free("drive.inertia.motor_kg_m2", drive.inertia.motor_kg_m2, "kg m^2")]
+    found.append(_free("load.inertia_kg_m2", load.inertia_kg_m2, "kg m^2"))
+    if load.gravity is not None:
+        found.append(_free("load.gravity.mass_kg", load.gravity.mass_kg, "kg"))
+    if drive.mesh.model != "rigid":
+        paths = tuple(f"drive.torsion.stiffness_k{k}_nm_per_rad" for k in (1, 2, 3))
+        value = drive.torsion.stiffness_k1_nm_per_rad
+        found.append(Free("drive.torsion.stiffness_k1_nm_per_rad", paths, 0.4, value, "N m/rad"))
+        found.append(
+            _free("drive.torsion.damping_nm_s_per_rad", drive.torsion.damping_nm_s_per_rad, "N m s/rad")
+        )
+    friction = drive.friction
+    found.append(_free("drive.friction.coulomb_nm", friction.coulomb_nm, "N m"))
+    found.append(_free("drive.friction.viscous_nm_s_per_rad", friction.viscous_nm_s_per_rad, "N m s/rad"))
+    found.append(_free("drive.friction.load_coefficient", friction.load_coefficient, "1"))
+    for name, effect in state.effects.items():
+        for field_name, value in effect:
+            still = ("smoothing", "phase", "_deg", "gravity", "ambient", "reference", "sharpness", "counts")
+            if isinstance(value, float) and value > 0 and not any(word in field_name for word in still):
+                path = f"effects.{name}.{field_name}"
+                found.append(Free(path, (path,), 0.7, value, field_name.rpartition("_nm")[1].strip("_")))
+    if "motor_torque" in channels:
+        found.append(Free("motor_torque_gain", ("gain",), 0.3, state.gain, "1"))
+    return [free for free in found if free.value > 0]
+
+
+def _free(path: str, value: float, unit: str) -> Free:
+    return Free(path, (path,), _PRIORS.get(path.rpartition(".")[2], 0.5), float(value), unit)
+
+
+def scaled(state: State, frees: Sequence[Free], theta: Sequence[float]) -> State:
+    """``state`` with every freedom's numbers multiplied by exp(theta)."""
+    drive, load, effects, gain = state.drive, state.load, dict(state.effects), state.gain
+    for free, t in zip(frees, theta, strict=True):
+        factor = math.exp(float(t))
+        for path in free.paths:
+            section, _, rest = path.partition(".")
+            if section == "gain":
+                gain *= factor
+            elif section == "drive":
+                drive = _multiplied(drive, rest, factor)
+            elif section == "load":
+                load = _multiplied(load, rest, factor)
+            else:
+                name, _, field_name = rest.partition(".")
+                effects[name] = _multiplied(effects[name], field_name, factor)
+    return State(drive, load, effects, state.added, gain, state.seed)
+
+
+def _multiplied(model: BaseModel, path: str, factor: float) -> Any:
+    name, _, rest = path.partition(".")
+    value = getattr(model, name)
+    new = _multiplied(value, rest, factor) if rest else value * factor
+    return model.model_copy(update={name: new})
+
+
+def put(data: dict[str, Any], path: str, value: Any) -> None:
+    """Set a value by its dotted path; numbers in the path are indices of lists that are there."""
+    here: Any = data
+    *parents, last = path.split(".")
+    for key in parents:
+        here = here[int(key)] if isinstance(here, list) else here.setdefault(key, {})
+    if isinstance(here, list):
+        here[int(last)] = value
+    else:
+        here[last] = value
+
+
+def merge(data: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """``more`` laid over ``data`` in place; lists are appended to lists."""
+    for key, value in more.items():
+        below = data.get(key)
+        if isinstance(value, Mapping) and isinstance(below, dict):
+            merge(below, value)
+        elif isinstance(value, list) and isinstance(below, list | tuple):
+            data[key] = [*below, *value]
+        else:
+            data[key] = _copied(value)
+    return data
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _copied(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_copied(item) for item in value]
+    return value
+
+
+@dataclass
+class Interval:
+    """A fitted number with its 95 % interval; ``determined`` is false when the data cannot say."""
+
+    name: str
+    value: float
+    start: float
+    low: float
+    high: float
+    unit: str = ""
+    determined: bool = True
+    tied_to: list[str] = field(default_factory=list)
+
+    @property
+    def moved(self) -> bool:
+        """Whether the start value lies outside the interval and more than 3 % away."""
+        away = abs(self.value - self.start) > 0.03 * abs(self.start)
+        return self.determined and away and not self.low <= self.start <= self.high

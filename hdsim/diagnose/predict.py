@@ -1,0 +1,211 @@
+"""Step 2a, predict: the model under the measured motion and the known load, channel by channel.
+
+The motion is prescribed, so an unstable or unknown controller does not matter and nothing drifts away.
+With both encoders the motor's motion is prescribed, output motion and torques are predicted. Without the
+motor's encoder the output's motion times the ratio stands for it, and torques are predicted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from hdsim.diagnose.measured import Array, Record
+from hdsim.diagnose.spline import signal, smoothed
+from hdsim.errors import InputError
+
+if TYPE_CHECKING:
+    from hdsim.actuation.signal_data import SignalData
+    from hdsim.drive.parameters import Drive
+    from hdsim.parts import Builder, Effect
+
+#: Time for which the model runs before the record begins, so that its own oscillation has died away, s.
+LEAD_IN_S = 0.5
+#: Relative tolerance of predictions: tight against the steps of finite differences.
+RTOL = 1e-5
+
+LoadSource = Literal["scenario", "load_torque", "output_torque"]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a model is told of a record, and what it is asked.
+
+    Attributes:
+        motion: ``motor_angle`` or ``output_angle``: the measured motion that is prescribed.
+        load: where the load's torque comes from.
+        channels: the channels that are predicted.
+        locked: whether the scenario locks the output.
+    """
+
+    motion: str
+    load: LoadSource
+    channels: tuple[str, ...]
+    locked: bool = False
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model as the predictions need it."""
+
+    drive: Drive
+    effects: dict[str, Effect]
+    load: Any
+    seed: int = 0
+
+
+class _MeasuredTorque:
+    """A measured torque on the output."""
+
+    def __init__(self, torque: SignalData) -> None:
+        self.torque = torque
+
+    def contribute(self, build: Builder) -> None:
+        from hdsim.actuation._kernels import load_torque
+
+        build.element(load_torque, [build.signal(self.torque)])
+
+
+class _Gravity:
+    """A load without its torque over time."""
+
+    def __init__(self, load: Any) -> None:
+        self.load = load
+
+    def contribute(self, build: Builder) -> None:
+        if self.load.gravity is not None:
+            self.load.gravity.contribute(build)
+
+
+def plan_for(record: Record, *, load: LoadSource | None = None, output_locked: bool = False) -> Plan:
+    """Decide what is prescribed and what can be predicted.
+
+    Args:
+        record: the measured run.
+        load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
+        output_locked: the scenario locks the output.
+
+    Raises:
+        InputError: nothing can be predicted; the message names what is missing.
+    """
+    has = {c for c, good in record.trusted.items() if good.sum() > 20}
+    moving = {c for c in has if float(np.ptp(record.filled(c))) > 0}
+    if load is None:
+        load = "load_torque" if "load_torque" in moving else "scenario"
+    if load != "scenario" and load not in has:
+        raise InputError(f"{record.name}: the load is to come from {load}, which is not measured")
+    if "motor_angle" in has:
+        motion = "motor_angle"
+    elif "output_angle" in has and not output_locked:
+        motion = "output_angle"
+    else:
+        raise InputError(
+            f"{record.name}: a motion is needed, motor_angle or output_angle; found {', '.join(sorted(has))}"
+        )
+    predicted = [c for c in ("motor_torque", "output_angle", "output_torque") if c in moving]
+    if motion == "output_angle" or output_locked:
+        predicted = [c for c in predicted if c != "output_angle"]
+    if load == "output_torque":
+        predicted = [c for c in predicted if c != "output_torque"]
+    if not predicted:
+        raise InputError(
+            f"{record.name}: nothing can be predicted from {', '.join(sorted(has))}: with {motion} given, "
+            "motor_torque, output_torque or (with motor_angle) output_angle must be measured and vary"
+        )
+    return Plan(motion, load, tuple(predicted), output_locked)
+
+
+class Predictor:
+    """Predicts the channels of one record for any candidate model.
+
+    Args:
+        record: the measured run.
+        plan: what is prescribed and predicted.
+        ratio: the model's signed ratio.
+        rtol: relative tolerance of the integration.
+    """
+
+    def __init__(self, record: Record, plan: Plan, ratio: float, rtol: float = RTOL) -> None:
+        self.record, self.plan, self.rtol = record, plan, rtol
+        values = record.filled(plan.motion)
+        breaks, coefficients = smoothed(record.time, values)
+        if plan.motion == "output_angle":
+            coefficients = coefficients * ratio
+        self.motion = signal(breaks, coefficients, LEAD_IN_S)
+        self.load_torque: SignalData | None = None
+        if plan.load != "scenario":
+            breaks, coefficients = smoothed(record.time, record.filled(plan.load))
+            sign = -1.0 if plan.load == "output_torque" else 1.0
+            self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
+        motion = self.motion.values(record.time + LEAD_IN_S)
+        #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
+        self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
+        self.ratio = ratio
+        self.runs = 0
+
+    def predict(self, candidate: Candidate) -> dict[str, Array]:
+        """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
+
+        Raises:
+            PredictionError: the model could not be integrated.
+        """
+        from hdsim.actuation.shapes import Hold
+        from hdsim.actuation.signal_data import SignalData
+        from hdsim.drive.model import Model
+        from hdsim.simulation.run import Run
+
+        load = candidate.load
+        parts: list[Any] = [*candidate.effects.values(), _Gravity(load)]
+        if self.load_torque is not None:
+            parts.append(_MeasuredTorque(self.load_torque))
+        elif load.torque is not None:
+            # The scenario's load begins with the record, after the lead-in.
+            parts.append(_MeasuredTorque(SignalData(load.torque.data.move.delayed(LEAD_IN_S))))
+        motions: dict[str, Any] = {"motor": self.motion}
+        if self.plan.locked:
+            motions["output"] = SignalData(Hold().move())
+        model = Model(
+            candidate.drive,
+            parts,
+            load_inertia_kg_m2=load.inertia_kg_m2,
+            motions=motions,
+            seed=candidate.seed,
+        )
+        period = self.record.period_s
+        run = Run(
+            model,
+            duration_s=LEAD_IN_S + self.record.duration_s + 2 * period,
+            sample_rate_hz=1.0 / period,
+            rtol=self.rtol,
+        )
+        self.runs += 1
+        got = run.record()
+        if run.failure:
+            raise PredictionError(run.failure)
+        found = {}
+        at = self.record.time + LEAD_IN_S
+        for channel in self.plan.channels:
+            source = f"measured_{channel}" if f"measured_{channel}" in got else channel
+            found[channel] = _interpolated(got.time, got[source], at)
+        return found
+
+
+class PredictionError(ArithmeticError):
+    """A candidate model could not be integrated."""
+
+
+def _interpolated(times: Array, values: Array, at: Array) -> Array:
+    """Cubic interpolation; exact where the clocks agree."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(times, values)(at))
+
+
+def predictors(
+    records: Sequence[Record], ratio: float, *, load: LoadSource | None = None, output_locked: bool = False
+) -> list[Predictor]:
+    """One predictor for each record."""
+    return [Predictor(r, plan_for(r, load=load, output_locked=output_locked), ratio) for r in records]

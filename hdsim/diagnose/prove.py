@@ -1,0 +1,73 @@
+"""Step 7, prove: the gap on data that no step has seen, before, after the re-fit and with the effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.freedom import State
+from hdsim.diagnose.measured import CHANNELS, Array
+from hdsim.diagnose.verdict import Gap
+
+#: Draws of blocks for the intervals.
+DRAWS = 500
+
+
+def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dict[str, list[Array]]]:
+    """Gap of every channel for the states ``before``, ``refit`` and ``after``, and their predictions.
+
+    Args:
+        bench: the measured series with their held-out parts.
+        states: the three models.
+    """
+    predictions = {
+        stage: bench.predict(state.candidate(), state.gain, everything=True)
+        for stage, state in states.items()
+    }
+    residuals = {stage: bench.residuals(found) for stage, found in predictions.items()}
+    rng = np.random.default_rng(17)
+    result = {}
+    for channel in bench.channels:
+        own = [k for k, s in enumerate(bench.series) if s.channel == channel and s.hold.any()]
+        if not own:
+            continue
+        numbers: dict[str, float] = {}
+        intervals: dict[str, tuple[float, float]] = {}
+        for stage, found in residuals.items():
+            powers, counts = [], []
+            for k in own:
+                series = bench.series[k]
+                rows = series.hold
+                blocks = series.block[rows] - series.block.min()
+                powers.append(np.bincount(blocks, found[k][rows] ** 2))
+                counts.append(np.bincount(blocks))
+            power, count = np.concatenate(powers), np.concatenate(counts)
+            power, count = power[count > 0], count[count > 0]
+            numbers[stage] = float(np.sqrt(power.sum() / count.sum()))
+            picks = rng.integers(0, len(power), size=(DRAWS, len(power)))
+            draws = np.sqrt(power[picks].sum(axis=1) / count[picks].sum(axis=1))
+            low, high = np.quantile(draws, [0.025, 0.975])
+            intervals[stage] = (float(low), float(high))
+        series = bench.series[own[0]]
+        result[channel] = Gap(
+            before=numbers["before"],
+            refit=numbers["refit"],
+            after=numbers["after"],
+            noise=float(np.sqrt(np.mean([bench.series[k].noise ** 2 for k in own]))),
+            unit=CHANNELS[channel],
+            variation=variation(bench, own[0]),
+            intervals=intervals,
+        )
+    return result, predictions
+
+
+def variation(bench: Bench, index: int) -> float:
+    """Standard deviation of what is to be predicted: of the output's angle, less motor angle over ratio."""
+    series = bench.series[index]
+    values = series.measured
+    if series.channel == "output_angle":
+        predictor = bench.predictors[series.record]
+        values = values - predictor.motor_angle / predictor.ratio
+    return float(np.std(values[series.train | series.hold]))

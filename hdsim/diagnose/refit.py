@@ -1,0 +1,66 @@
+"""Step 3, re-fit first: the numbers that the base model already has, before anything is called missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.fit import Fit, base_intervals, fit
+from hdsim.diagnose.freedom import Free, Interval, State, base_freedoms
+from hdsim.diagnose.measured import Array
+
+
+@dataclass
+class Refit:
+    """The base model with its own numbers fitted.
+
+    Attributes:
+        fit: the fitted model.
+        freedoms: the numbers as they were.
+        intervals: each with its interval, or marked as not determined by these data.
+        before: predictions of the model as given.
+    """
+
+    fit: Fit
+    freedoms: list[Free]
+    intervals: list[Interval]
+    before: list[Array]
+
+    @property
+    def moved(self) -> list[Interval]:
+        """Numbers whose start value lies outside their interval."""
+        return [interval for interval in self.intervals if interval.moved]
+
+
+def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Refit:
+    """Fit the base model's numbers to the training data.
+
+    Args:
+        bench: the measured series; their weights are set on the way.
+        state: the base model.
+        frees: numbers that may move; all that the base has when None.
+    """
+    freedoms = list(base_freedoms(state, bench.channels) if frees is None else frees)
+    before = bench.predict(state.candidate(), state.gain)
+    bench.weigh(bench.residuals(before))
+    found = fit(bench, state, freedoms, evaluations=5)
+    # Weights follow the residual: what the first fit explained no longer counts as noise.
+    bench.weigh(bench.residuals(found.predictions))
+    theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
+    undetermined, ties = found.undetermined, found.ties
+    found = fit(bench, state, found.frees, theta=theta, prune=False, evaluations=5)
+    found.undetermined, found.ties = undetermined, ties
+    reweigh(bench, found)
+    return Refit(found, freedoms, base_intervals(found, freedoms), before)
+
+
+def reweigh(bench: Bench, found: Fit) -> None:
+    """Set the weights from what a fit leaves, and its sensitivities with them."""
+    old = np.array([series.sigma for series in bench.series])
+    bench.weigh(bench.residuals(found.predictions))
+    new = np.array([series.sigma for series in bench.series])
+    if found.columns.size:
+        found.columns *= (old / new)[bench.stacked_series()][:, None]

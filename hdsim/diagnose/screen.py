@@ -1,0 +1,122 @@
+"""Explained shares of a residual: cross-validated over blocks of time, with the whole search's false alarms.
+
+A *design* is a set of columns. Its share is the part of the residual's power that a linear fit of them
+removes in blocks that it has not seen, after the base model's own sensitivities have been taken out of
+columns and residual alike, so that nothing a wrong parameter explains counts. The chance level of the
+best share of a whole search comes from the wild bootstrap with blocks as clusters (Cameron, Gelbach and
+Miller 2008, Review of Economics and Statistics 90:414): the residual's blocks with random signs, searched
+in the same way; the largest share of each draw counts (Westfall and Young 1993, Resampling-Based Multiple
+Testing).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.diagnose.measured import Array
+
+#: Folds of the cross-validation, and blocks that stay together in a fold.
+FOLDS, TOGETHER = 5, 2
+#: Draws of the wild bootstrap.
+DRAWS = 400
+
+
+@dataclass
+class Share:
+    """What a design explains.
+
+    Attributes:
+        share: of the residual's power, cross-validated; negative when it only adds freedom.
+        losses: shape (blocks,), power of each block that is left when it is predicted unseen.
+        coefficients: shape (columns,), of the fit to all blocks.
+        chance: shape (draws,), shares of the same design on surrogates.
+    """
+
+    share: float
+    losses: Array
+    coefficients: Array
+    chance: Array
+
+
+class Residual:
+    """A residual with the directions that the base model can explain taken out.
+
+    Args:
+        values: shape (n,), whitened.
+        base: shape (n, b), the base model's sensitivities and offsets.
+        blocks: shape (n,), block of every row.
+        seed: of the surrogates' signs.
+    """
+
+    def __init__(self, values: Array, base: Array, blocks: NDArray[np.int64], seed: int = 0) -> None:
+        scale = np.linalg.norm(base, axis=0)
+        base = base[:, scale > 0] / scale[scale > 0]
+        vectors, singular, _ = np.linalg.svd(base, full_matrices=False) if base.size else (base, [], None)
+        self._base = vectors[:, np.asarray(singular) > 1e-8] if base.size else np.zeros((len(values), 0))
+        self.values = self.project(values)
+        used, self._blocks = np.unique(blocks, return_inverse=True)
+        self.count = len(used)
+        fold = (np.arange(self.count) // TOGETHER) % FOLDS
+        self._folds = [np.flatnonzero(fold == k) for k in range(FOLDS) if (fold == k).any()]
+        self.powers: Array = np.asarray(np.bincount(self._blocks, self.values**2, self.count), dtype=float)
+        self.power = float(self.powers.sum())
+        self._signs = np.random.default_rng([seed, 5]).choice([-1.0, 1.0], size=(DRAWS, self.count))
+
+    def project(self, values: Array) -> Array:
+        """Without what the base's directions explain; shape of ``values``."""
+        return np.asarray(values - self._base @ (self._base.T @ values))
+
+    def share(self, columns: Array, rows: NDArray[np.bool_] | None = None) -> Share:
+        """What a design of shape (n, k) explains.
+
+        Args:
+            columns: the design.
+            rows: rows that count (one channel, say); all by default.
+        """
+        x = self.project(columns)
+        y, powers = self.values, self.powers
+        if rows is not None:
+            x, y = x * rows[:, None], y * rows
+            powers = np.asarray(np.bincount(self._blocks, y**2, self.count), dtype=float)
+        total = float(powers.sum())
+        norm = np.linalg.norm(x, axis=0)
+        alive = norm > 1e-6 * max(float(np.linalg.norm(columns)), 1e-300)
+        k = int(alive.sum())
+        coefficients = np.zeros(columns.shape[1])
+        if k == 0 or total <= 0:
+            return Share(0.0, powers, coefficients, np.zeros(DRAWS))
+        x = x[:, alive] / norm[alive]
+        moments = np.stack([np.bincount(self._blocks, x[:, a] * y, self.count) for a in range(k)], axis=1)
+        gram = np.empty((self.count, k, k))
+        for a in range(k):
+            for b in range(a, k):
+                gram[:, a, b] = gram[:, b, a] = np.bincount(self._blocks, x[:, a] * x[:, b], self.count)
+        # A trace of ridge keeps columns that the record does not tell apart from blowing up.
+        ridge = 1e-6 * np.eye(k)
+        whole, right = gram.sum(axis=0) + ridge, moments.sum(axis=0)
+        coefficients[alive] = np.linalg.solve(whole, right) / norm[alive]
+        losses = np.empty(self.count)
+        draws = np.zeros(DRAWS)
+        flipped = self._signs @ moments  # (draws, k)
+        for fold in self._folds:
+            inner = whole - gram[fold].sum(axis=0)
+            beta = np.linalg.solve(inner, right - moments[fold].sum(axis=0))
+            losses[fold] = (
+                powers[fold] - 2 * moments[fold] @ beta + np.einsum("bij,i,j->b", gram[fold], beta, beta)
+            )
+            own = self._signs[:, fold] @ moments[fold]
+            betas = np.linalg.solve(inner, (flipped - own).T).T
+            square = gram[fold].sum(axis=0)
+            draws += -2 * np.einsum("dk,dk->d", own, betas) + np.einsum("di,ij,dj->d", betas, square, betas)
+        return Share(1.0 - float(losses.sum()) / total, losses, coefficients, -draws / total)
+
+
+def chance_of(best: float, draws: list[Array]) -> float:
+    """Probability that a search over all these designs finds a share as large as ``best`` by chance."""
+    if not draws:
+        return 1.0
+    largest = np.max(np.stack(draws), axis=0)
+    return float((1 + np.sum(largest >= best)) / (1 + len(largest)))

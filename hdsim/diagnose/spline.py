@@ -1,0 +1,86 @@
+"""A measured motion as a smooth signal: least-squares cubic splines with cross-validated knots."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hdsim.diagnose.measured import Array
+from hdsim.errors import InputError
+
+if TYPE_CHECKING:
+    from hdsim.actuation.signal_data import SignalData
+
+#: Samples between knots that are tried.
+SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0)
+
+
+def smoothed(time: Array, values: Array) -> tuple[Array, Array]:
+    """Knots (k + 1,) and cubic coefficients (4, k) of the spline that predicts left-out samples best.
+
+    Generalised cross-validation (Craven and Wahba 1979, Numerische Mathematik 31:377) of uniform
+    least-squares splines: coarse knots when the data are noisy, the interpolating spline when they are not.
+
+    Args:
+        time: shape (n,), s, strictly increasing.
+        values: shape (n,).
+    """
+    from scipy.interpolate import CubicSpline, PPoly, make_lsq_spline
+
+    n = len(time)
+    best, chosen = np.inf, None
+    rises = 0
+    for spacing in SPACINGS:
+        pieces = int((n - 1) / spacing)
+        if pieces < 4:
+            break
+        inner = np.linspace(time[0], time[-1], pieces + 1)[1:-1]
+        knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
+        try:
+            spline = make_lsq_spline(time, values, knots, k=3)
+        except (ValueError, np.linalg.LinAlgError):
+            continue  # a gap leaves a stretch between knots without samples
+        residual = values - spline(time)
+        score = float(np.mean(residual**2)) / (1.0 - (pieces + 3) / n) ** 2
+        if score < best:
+            best, chosen, rises = score, spline, 0
+        else:
+            rises += 1
+            if rises >= 3:
+                break
+    if chosen is None:
+        exact = CubicSpline(time, values)
+        return np.asarray(exact.x), np.asarray(exact.c[::-1])
+    pieces_of = PPoly.from_spline(chosen)
+    keep = np.diff(pieces_of.x) > 0
+    breaks = np.concatenate([pieces_of.x[:-1][keep], [time[-1]]])
+    return breaks, np.asarray(pieces_of.c[::-1][:, keep])
+
+
+def signal(breaks: Array, coefficients: Array, lead_in_s: float = 0.0) -> SignalData:
+    """The spline as a signal of the simulation, after a lead-in at its initial slope.
+
+    Args:
+        breaks: shape (k + 1,), s.
+        coefficients: shape (4, k), constant term first.
+        lead_in_s: time before the first break, s.
+    """
+    from hdsim.actuation import _signal_kernel as law
+    from hdsim.actuation.signal_data import Move, Segment, SignalData, hold
+
+    if not np.all(np.isfinite(coefficients)):
+        raise InputError("a measured channel cannot be smoothed: it holds values that are not finite")
+    first, slope = coefficients[0, 0], coefficients[1, 0]
+    starts = breaks[:-1] - breaks[0] + lead_in_s
+    rows = [tuple(row) for row in coefficients.T.tolist()]
+    times = starts.tolist()
+    if lead_in_s > 0:
+        times = [0.0, *times]
+        rows = [(float(first - slope * lead_in_s), float(slope), 0.0, 0.0), *rows]
+    width = breaks[-1] - breaks[-2]
+    c = coefficients[:, -1]
+    end = float(breaks[-1] - breaks[0] + lead_in_s)
+    final = float(c[0] + width * (c[1] + width * (c[2] + width * c[3])))
+    segment = Segment(law.CUBIC, times, rows)
+    return SignalData(Move((segment, hold(end, final)), end, rows[0][0], final))

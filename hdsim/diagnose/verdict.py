@@ -1,0 +1,125 @@
+"""The verdict of a diagnosis as data: what ``verdict.json`` holds. Version 1."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+VERSION = 1
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(use_attribute_docstrings=True, extra="forbid")
+
+
+class FittedNumber(_Part):
+    """A fitted number."""
+
+    value: float
+    """Its value, in the unit of its field's name."""
+    interval: tuple[float, float] | None = None
+    """95 % interval; null when the data do not determine it."""
+    start: float | None = None
+    """Its value in the base model, where it has one."""
+    tied_to: list[str] = []
+    """Numbers that these data cannot tell it from."""
+
+
+class NamedEffect(_Part):
+    """An effect that the model was missing."""
+
+    name: str
+    """Its name in the catalogue."""
+    title: str = ""
+    """The field's term for it."""
+    confidence: float = Field(ge=0, le=1)
+    """Share of resampled records in which it, or its group, is the best."""
+    chance: float = Field(ge=0, le=1)
+    """Probability that the whole search finds such a share where nothing is missing."""
+    explained: float
+    """Cross-validated share of the residual that its trace explained when it was found."""
+    parameters: dict[str, FittedNumber] = {}
+    """Its fitted fields."""
+    indistinguishable_from: list[str] = []
+    """Effects that explain these data as well."""
+    separated_by: dict[str, str] = {}
+    """For each of them, what would tell the two apart."""
+
+
+class Gap(_Part):
+    """Root-mean-square difference of measurement and model in one channel, on held-out data."""
+
+    before: float
+    """Of the model as given, offsets removed."""
+    refit: float
+    """After its own numbers were fitted."""
+    after: float
+    """With the named effects."""
+    noise: float
+    """Standard deviation of the channel's noise."""
+    unit: str
+    """Unit of all of them."""
+    data: Literal["holdout"] = "holdout"
+    """What they were computed on."""
+    variation: float
+    """Standard deviation of the measured channel (of the transmission error, for the output's angle)."""
+    intervals: dict[str, tuple[float, float]] = {}
+    """95 % intervals of before, refit and after, from resampled blocks of time."""
+
+
+class Located(_Part):
+    """Where a residual lives."""
+
+    stage: str
+    """``refit``, or after which effect."""
+    coordinate: str
+    """Coordinate that it is a function of."""
+    channel: str
+    """Channel."""
+    share: float
+    """Cross-validated share of the channel's residual power."""
+    orders: list[float] = []
+    """Orders per wave-generator turn of its spectrum's peaks."""
+
+
+class DataProblem(_Part):
+    """Something wrong with the data."""
+
+    record: str
+    channel: str
+    kind: str
+    severity: str
+    message: str
+    count: int = 0
+
+
+class Verdict(_Part):
+    """What a diagnosis found."""
+
+    version: int = VERSION
+    """Version of this layout."""
+    verdict: Literal["nothing", "parameter", "effect", "unknown"]
+    """``unknown``: structure is left that nothing in the catalogue explains."""
+    sentence: str
+    """The verdict in words."""
+    effects: list[NamedEffect] = []
+    """Named effects in the order in which they were found."""
+    suspects: dict[str, float] = {}
+    """For ``unknown``: effects that explain a part, with the share, none of them enough to be named."""
+    parameters: dict[str, FittedNumber] = {}
+    """The base model's own numbers, fitted."""
+    moved: list[str] = []
+    """Those whose start value lies outside their interval."""
+    gap: dict[str, Gap] = {}
+    """By channel."""
+    located: list[Located] = []
+    """Strongest places first within each stage."""
+    data_problems: list[DataProblem] = []
+    """What the data check found."""
+    not_tried: dict[str, str] = {}
+    """Effects of the catalogue that could not be tried, with the reason."""
+    scenario: str | None = None
+    """The scenario that extends the base with what was found."""
+    seconds: dict[str, float] = {}
+    """Time spent in each step."""

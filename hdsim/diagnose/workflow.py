@@ -1,0 +1,304 @@
+"""The whole diagnosis: check, compare, re-fit, then locate, name and add until nothing is left, and prove."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hdsim.diagnose.add import fitted_numbers
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.check import Check, check_record
+from hdsim.diagnose.fit import Fit, added_spreads, base_intervals
+from hdsim.diagnose.freedom import Interval, State, state_of
+from hdsim.diagnose.locate import Location, locate
+from hdsim.diagnose.measured import Array, Record, record_from
+from hdsim.diagnose.name import LEAST_SHARE, LEVEL, Named, Screening, block_losses, name_effect, screen
+from hdsim.diagnose.predict import LoadSource, predictors
+from hdsim.diagnose.prove import gaps
+from hdsim.diagnose.refit import Refit, refit, reweigh
+from hdsim.diagnose.screen import Residual
+from hdsim.diagnose.verdict import DataProblem, FittedNumber, Located, NamedEffect, Verdict
+from hdsim.effects import catalogue
+from hdsim.errors import InputError
+
+if TYPE_CHECKING:
+    from hdsim.recording import Recording
+    from hdsim.scenario import Scenario
+
+#: Most effects that one diagnosis adds.
+MOST_EFFECTS = 4
+#: Share of the weighed residual that must be structured for ``unknown``, and the part of all structure that
+#: the named effects must explain to be believed.
+STRUCTURED, ADEQUATE = 0.12, 0.7
+#: Least relative fall of a held-out gap for the verdict ``parameter``.
+LEAST_FALL = 0.03
+
+
+@dataclass
+class Stage:
+    """One pass of locate and name."""
+
+    title: str
+    location: Location
+    screening: Screening | None = None
+    named: Named | None = None
+
+
+@dataclass
+class Diagnosis:
+    """Everything that a diagnosis found; ``verdict`` is its summary."""
+
+    verdict: Verdict
+    checks: list[Check]
+    bench: Bench
+    refit: Refit
+    stages: list[Stage]
+    final: Fit
+    start: State
+    predictions: dict[str, list[Array]] = field(default_factory=dict)
+
+
+def diagnose(
+    measured: Sequence[Recording | Record],
+    scenario: Scenario,
+    *,
+    holdout: Sequence[Recording | Record] = (),
+    load: LoadSource | None = None,
+    force: bool = False,
+    on_step: Callable[[str], object] | None = None,
+) -> Diagnosis:
+    """Find what a model is missing.
+
+    Args:
+        measured: records that fits may see.
+        scenario: the model; what it commands does not matter, its motion is the measured one.
+        holdout: records that only the proof sees; parts of ``measured`` when there are none.
+        load: where the load's torque comes from; ``output_torque`` takes what the joint's sensor measures.
+        force: go on in spite of errors in the data.
+        on_step: told what is being done.
+
+    Returns:
+        The diagnosis with its verdict.
+
+    Raises:
+        InputError: the data cannot answer the question, or are suspect (see ``force``).
+    """
+    tell = on_step or (lambda _: None)
+    seconds: dict[str, float] = {}
+
+    @contextmanager
+    def step(name: str, text: str) -> Iterator[None]:
+        tell(text)
+        started = time.perf_counter()
+        yield
+        seconds[name] = round(seconds.get(name, 0.0) + time.perf_counter() - started, 3)
+
+    ratio = scenario.drive.ratio
+    with step("check", "checking the data"):
+        records, held = (
+            [r if isinstance(r, Record) else record_from(r) for r in many] for many in (measured, holdout)
+        )
+        if not records:
+            raise InputError("no measured record is given")
+        checks = [check_record(record, ratio) for record in [*records, *held]]
+        problems = [problem for check in checks for problem in check.problems]
+        errors = [problem for check in checks for problem in check.errors]
+        if errors and not force:
+            lines = "\n".join(f"{p.record}: {p.channel}: {p.kind}: {p.message}" for p in errors)
+            raise InputError(f"{lines}\nmend the mapping or the data, or go on in spite of it (--force)")
+    with step("compare", "predicting the measured channels"):
+        locked = scenario.command.output.type == "locked"
+        training = predictors(records, ratio, load=load, output_locked=locked)
+        bench = Bench(training, predictors(held, ratio, load=load, output_locked=locked))
+    start = state_of(scenario)
+    with step("refit", "re-fitting the model's own numbers"):
+        base = refit(bench, start)
+    current = base.fit
+    stages: list[Stage] = []
+    named: list[Named] = []
+    while True:
+        title = "refit" if not named else f"with {named[-1].name}"
+        residuals = bench.residuals(current.predictions)
+        left = _left(bench, current, residuals)
+        with step("locate", f"locating what is left {title}"):
+            stages.append(Stage(title, locate(bench, left, residuals)))
+        stage = stages[-1]
+        if len(named) == MOST_EFFECTS:
+            break
+        with step("screen", "screening the catalogue"):
+            stage.screening = screen(
+                bench, current.state, current.predictions, left, stage.location.lines,
+                on_step=lambda effect: tell(f"screening {effect}"),
+            )  # fmt: skip
+        ranked = stage.screening.ranked
+        if not ranked or stage.screening.chance > LEVEL:
+            break
+        # A later effect has to matter beside what the first one explained.
+        first = float(block_losses(bench, base.fit.predictions).sum())
+        if ranked[0].share.share * left.power < LEAST_SHARE * first:
+            break
+        with step("fit", "fitting the shortlist"):
+            found = name_effect(bench, current, stage.screening, on_step=tell)
+        if found is None:
+            break
+        if block_losses(bench, current.predictions).sum() - found.losses.sum() < LEAST_SHARE * first:
+            break
+        stage.named = found
+        named.append(found)
+        current = found.fit
+        reweigh(bench, current)
+    explained = float(
+        (block_losses(bench, base.fit.predictions) - block_losses(bench, current.predictions)).sum()
+    )
+    last = stages[-1].location
+    rest = last.structured * left.power
+    adequate = explained >= ADEQUATE * (explained + rest)
+    unknown = last.chance <= LEVEL and last.structured > STRUCTURED and not adequate
+    if unknown:
+        # What explains only a part is not added.
+        current = base.fit
+    with step("prove", "proving on held-out data"):
+        states = {"before": start, "refit": base.fit.state, "after": current.state}
+        gap, predictions = gaps(bench, states)
+    intervals = base_intervals(current, base.freedoms)
+    intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
+    moved = [i.name for i in base.intervals if i.moved]
+    fell = any(g.refit < (1.0 - LEAST_FALL) * g.before for g in gap.values())
+    common: dict[str, Any] = {
+        "parameters": {i.name: _number(i) for i in intervals},
+        "moved": moved,
+        "gap": gap,
+        "located": _located(stages),
+        "data_problems": [DataProblem(**vars(problem)) for problem in problems],
+        "not_tried": stages[0].screening.skipped if stages[0].screening else {},
+        "seconds": seconds,
+    }
+    if unknown:
+        place = stages[0].location.places[0]
+        suspects = {n.name: round(float(s.screening.ranked[0].share.share), 3)
+                    for n, s in zip(named, stages, strict=False) if s.screening}  # fmt: skip
+        verdict = Verdict(
+            verdict="unknown",
+            sentence="Something is missing that nothing in the catalogue explains: "
+            f"{100 * place.share:.0f} % of what is left of {place.channel} is a function of "
+            f"{place.coordinate.replace('_', ' ')}.",
+            suspects=suspects,
+            **common,
+        )
+    elif named:
+        effects = _effects(named, stages)
+        words = " and ".join(_words(effect) for effect in effects)
+        verdict = Verdict(
+            verdict="effect", sentence=f"The model is missing {words}.", effects=effects, **common
+        )
+    elif moved and fell:
+        changes = ", ".join(
+            f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip()
+            for i in base.intervals if i.moved
+        )  # fmt: skip
+        verdict = Verdict(
+            verdict="parameter",
+            sentence=f"No effect is missing; numbers of the model are off: {changes}.",
+            **common,
+        )
+    else:
+        verdict = Verdict(verdict="nothing", sentence="The data show nothing that the model lacks.", **common)
+    return Diagnosis(verdict, checks, bench, base, stages, current, start, predictions)
+
+
+def _left(bench: Bench, current: Fit, residuals: list[Array]) -> Residual:
+    """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
+    numbers = bench.stacked_series()
+    offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
+    base = np.hstack([current.columns, offsets])
+    return Residual(bench.stacked(residuals), base, bench.stacked_blocks())
+
+
+def _number(interval: Interval) -> FittedNumber:
+    bounds = (interval.low, interval.high) if interval.determined else None
+    return FittedNumber(value=interval.value, interval=bounds, start=interval.start, tied_to=interval.tied_to)
+
+
+def _effects(named: Sequence[Named], stages: Sequence[Stage]) -> list[NamedEffect]:
+    known = catalogue()
+    found = []
+    for k, one in enumerate(named):
+        screening = stages[k].screening
+        assert screening is not None
+        shares = {s.name: s.share.share for s in screening.ranked}
+        added, covariance, shapes = added_spreads(one.fit, k)[0]
+        confused = known[one.name].signature.confused_with
+        found.append(
+            NamedEffect(
+                name=one.name,
+                title=" ".join(
+                    [known[one.name].title, f"({added.fitting.label})" if added.fitting.label else ""]
+                ).strip(),
+                confidence=one.confidence,
+                chance=screening.chance,
+                explained=shares[one.name],
+                parameters=fitted_numbers(added, covariance, shapes),
+                indistinguishable_from=list(one.group),
+                separated_by={
+                    other: confused.get(other) or known[other].signature.confused_with.get(one.name, "")
+                    for other in one.group
+                },
+            )
+        )
+    return found
+
+
+def _words(effect: NamedEffect) -> str:
+    others = [catalogue()[name].title for name in effect.indistinguishable_from]
+    return f"{effect.title} (these data cannot tell it from {', '.join(others)})" if others else effect.title
+
+
+def _located(stages: Sequence[Stage], most: int = 6) -> list[Located]:
+    found = []
+    for stage in stages:
+        best: dict[tuple[str, str], Located] = {}
+        for place in stage.location.places:
+            key = (place.coordinate, place.channel)
+            if key in best or place.share < 0.02 or len(best) >= most:
+                continue
+            orders = [line.order for line in stage.location.lines if line.channel == place.channel]
+            best[key] = Located(
+                stage=stage.title,
+                coordinate=place.coordinate,
+                channel=place.channel,
+                share=round(place.share, 4),
+                orders=orders if place.coordinate == "wave_generator_angle" else [],
+            )
+        found += list(best.values())
+    return found
+
+
+def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
+    """Write ``verdict.json``, the scenario, the figures, the log and the report; returns the report's path.
+
+    Args:
+        diagnosis: what was found.
+        base: file of the base scenario.
+        out: directory; made when it is not there.
+    """
+    from hdsim.diagnose.add import scenario_text
+    from hdsim.diagnose.report import write_report
+
+    out = Path(out)
+    out.mkdir(parents=True, exist_ok=True)
+    if diagnosis.verdict.verdict in ("effect", "parameter"):
+        path = out / "found.yaml"
+        freedoms = diagnosis.refit.freedoms
+        text = scenario_text(
+            Path(base).resolve(), diagnosis.final.state, freedoms, diagnosis.start, out.resolve()
+        )
+        path.write_text(text, encoding="utf-8")
+        diagnosis.verdict.scenario = str(path)
+    (out / "verdict.json").write_text(diagnosis.verdict.model_dump_json(indent=2), encoding="utf-8")
+    return write_report(diagnosis, out)

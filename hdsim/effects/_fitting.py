@@ -1,0 +1,83 @@
+"""How an effect is fitted to data: which of its numbers scale its trace, and which shape it.
+
+An effect may declare ``fittings``, a tuple of ``Fitting``; without one it can be simulated but not named
+by a diagnosis. The terms say in which numbers the trace is, nearly, proportional to a coefficient; a
+diagnosis simulates each term once at its unit size and has the trace that the effect leaves in every channel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """Fields that grow in proportion to one coefficient: field to its value at coefficient 1."""
+
+    units: Mapping[str, float]
+    signed: bool = False
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """A stiffness in series: the field is ``unit`` over the coefficient."""
+
+    path: str
+    unit: float
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """Amplitude and phase of sin(angle + phase): two coefficients, of the sine and of the cosine."""
+
+    amplitude: str
+    phase: str
+    unit: float
+
+
+@dataclass(frozen=True)
+class Periodic:
+    """Harmonics whose orders per wave-generator turn are read from the data; one list item each.
+
+    Args:
+        section: path of the list.
+        amplitude: field of an item that is its amplitude.
+        unit: its value at coefficient 1.
+        settings: further fields of an item.
+        channel: the channel whose order spectrum says which orders.
+    """
+
+    section: str
+    amplitude: str
+    unit: float
+    channel: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A field in which the trace is not linear, with the values where a fit may start."""
+
+    path: str
+    starts: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """One way to fit an effect.
+
+    Args:
+        terms: what scales its trace.
+        shapes: what shapes it.
+        settings: fields that stay as given here, nested.
+        label: tells this way from the effect's others.
+        needs: channels without which it cannot be told.
+    """
+
+    terms: tuple[Amplitude | Inverse | Harmonic | Periodic, ...]
+    shapes: tuple[Shape, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    label: str = ""
+    needs: tuple[str, ...] = ()
