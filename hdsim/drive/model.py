@@ -204,7 +204,8 @@ class Model:
         return inertia.motor_kg_m2 + inertia.wave_generator_kg_m2, inertia.ring_kg_m2, output
 
     def _assemble(self) -> System:
-        from hdsim.drive import _assembly as a
+        from hdsim.drive import _layout as a
+        from hdsim.drive._assembly import drive_system
         from hdsim.simulation.system import System
 
         given = self._given
@@ -277,7 +278,7 @@ class Model:
         self._columns = columns
         y0, scale = self._initial(states)
         return System(
-            kernel=a.drive_system,
+            kernel=drive_system,
             integers=np.concatenate([head_integers, np.array(lists, dtype=np.int64)]),
             reals=np.concatenate(reals),
             scratch_size=scratch,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.drive import _assembly as a
+from hdsim.drive import _layout as a
 from hdsim.drive import _mesh
+from hdsim.drive._assembly import observe
 from hdsim.kernel import (
     COMMANDED_TORQUE,
     INPUT_FRICTION,
@@ -59,7 +60,7 @@ class Observer:
         """
         system = self.model.system
         rows = np.empty((len(times), self._kept + system.size))
-        a.observe(
+        observe(
             times,
             np.ascontiguousarray(states),
             system.integers,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.drive import _assembly as a
+from hdsim.drive import _layout as a
 from hdsim.drive import _mesh
 from hdsim.drive.model import COORDINATES, Model
 from hdsim.errors import InputError

@@ -176,7 +176,7 @@ class Run:
         Args:
             on_time: called now and then with the time that has been reached, s.
         """
-        from hdsim.drive import _assembly as a
+        from hdsim.drive import _layout as a
 
         velocity = self.model.place_of.get("motor", self.model.place_of.get("output", -1)) + 1
 

@@ -302,7 +302,7 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
     Raises:
         HdsimError: the run stopped early.
     """
-    from hdsim.drive import _assembly
+    from hdsim.drive import _layout
     from hdsim.scenario.model import Scenario
     from hdsim.simulation.setup import build_run
 
@@ -318,7 +318,7 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
     run = build_run(scenario)
     model = run.model
     if model.teeth is not None:
-        numbers = model.system.reals[int(model.system.integers[_assembly.MESH_AT]) :]
+        numbers = model.system.reals[int(model.system.integers[_layout.MESH_AT]) :]
         for cause in off:
             if cause.name == "backlash":
                 model.teeth.close_gaps(numbers)

@@ -1,0 +1,255 @@
+"""The compiled right-hand side of a drive with a compliant mesh; see ``hdsim.drive._assembly``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hdsim._abi import call_mesh
+from hdsim._compile import compiled
+from hdsim.drive import _mesh
+from hdsim.drive._layout import (
+    COLUMNS,
+    GAIN,
+    INERTIA,
+    INVERSE_RATIO,
+    KAPPA,
+    LAMBDA,
+    MESH_ADDRESS,
+    MESH_AT,
+    OUTPUT_SHARE,
+    OWN_STATES,
+    RING,
+    RING_DYNAMIC,
+    RING_STATIC,
+    S_ACCELERATIONS,
+    S_ANGLES,
+    S_CONSTRAINT,
+    S_ERROR,
+    S_INPUTS,
+    S_KINETIC,
+    S_MESH,
+    S_MESH_1,
+    S_POTENTIAL,
+    S_RING_1,
+    S_TWIST_1,
+    S_VELOCITIES,
+    SIGNAL_OF,
+    STATE_OF,
+    STATES,
+)
+from hdsim.drive._terms import fill_inputs, read_coordinates, read_error, run_elements, scatter
+from hdsim.kernel import (
+    DELIVERED,
+    DISSIPATED,
+    MESH_TORQUE,
+    MESH_TWIST,
+    MESH_TWIST_RATE,
+    MOTOR_ANGLE,
+    OUTPUT_ANGLE,
+    OWN,
+    RING_ANGLE,
+    STORED,
+    SUPPLIED,
+    TIME,
+    TRANSMITTED_TORQUE,
+    TWIST,
+    TWIST_RATE,
+    TWIST_TORQUE,
+)
+
+_jit: Any = compiled
+
+
+@_jit
+def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
+    """Ring angle at which mesh and structure balance: safeguarded Newton on the convex potential."""
+    angles = scratch[S_ANGLES : S_ANGLES + 3]
+    error = scratch[S_ERROR : S_ERROR + 6]
+    result = scratch[S_MESH : S_MESH + _mesh.RESULT_SIZE]
+    parameters = reals[integers[MESH_AT] :]
+    free = reals[KAPPA] * angles[2]
+    loaded = reals[GAIN] * (angles[0] * reals[INVERSE_RATIO] - reals[OUTPUT_SHARE] * angles[2] + error[0])
+    # Wider than from free to loaded: pitch errors push without a twist, the window's slope pulls.
+    margin = 1e-5 + parameters[_mesh.LARGEST_PITCH_ERROR] / parameters[_mesh.LEVER]
+    low = min(free, loaded) - margin
+    high = max(free, loaded) + margin
+    angles[1] = free + 0.7 * (loaded - free)
+    for _ in range(100):
+        call_mesh(integers[MESH_ADDRESS], angles, error, parameters, result)
+        slope = result[_mesh.GRADIENT + 1]
+        if slope > 0.0:
+            high = angles[1]
+        else:
+            low = angles[1]
+        step = -slope / result[_mesh.HESSIAN + 3]
+        following = angles[1] + step
+        if not (low <= following <= high):
+            following = 0.5 * (low + high)
+            step = following - angles[1]
+        if abs(step) <= 1e-14 * (1e-3 + abs(following - free)) or following == angles[1]:
+            break
+        angles[1] = following
+    stiffness = result[_mesh.HESSIAN + 3]
+    scratch[S_RING_1] = -result[_mesh.HESSIAN + 1] / stiffness
+    scratch[S_RING_1 + 1] = 0.0
+    scratch[S_RING_1 + 2] = -result[_mesh.HESSIAN + 4] / stiffness
+    # Schur complement: Hessian of the potential with the ring at its balance.
+    mf = result[_mesh.HESSIAN + 1]
+    fo = result[_mesh.HESSIAN + 4]
+    result[_mesh.HESSIAN] -= mf * mf / stiffness
+    result[_mesh.HESSIAN + 2] -= mf * fo / stiffness
+    result[_mesh.HESSIAN + 5] -= fo * fo / stiffness
+    result[_mesh.HESSIAN + 1] = 0.0
+    result[_mesh.HESSIAN + 4] = 0.0
+    result[_mesh.GRADIENT + 1] = 0.0
+    scratch[S_VELOCITIES + 1] = (
+        scratch[S_RING_1] * scratch[S_VELOCITIES] + scratch[S_RING_1 + 2] * scratch[S_VELOCITIES + 2]
+    )
+
+
+@_jit
+def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
+    """Right-hand side with a compliant mesh."""
+    read_coordinates(t, y, integers, reals, scratch)
+    read_error(integers, reals, scratch)
+    angles = scratch[S_ANGLES : S_ANGLES + 3]
+    velocities = scratch[S_VELOCITIES : S_VELOCITIES + 3]
+    error = scratch[S_ERROR : S_ERROR + 6]
+    result = scratch[S_MESH : S_MESH + _mesh.RESULT_SIZE]
+    ring = integers[RING]
+    if ring == RING_STATIC:
+        balance_ring(integers, reals, scratch)
+    else:
+        call_mesh(integers[MESH_ADDRESS], angles, error, reals[integers[MESH_AT] :], result)
+    h_mm = result[_mesh.HESSIAN]
+    h_mf = result[_mesh.HESSIAN + 1]
+    h_mo = result[_mesh.HESSIAN + 2]
+    h_ff = result[_mesh.HESSIAN + 3]
+    h_fo = result[_mesh.HESSIAN + 4]
+    h_oo = result[_mesh.HESSIAN + 5]
+    # The ports: first derivatives over the angles; second ones exist only through the error.
+    torsion = scratch[S_TWIST_1 : S_TWIST_1 + 3]
+    meshing = scratch[S_MESH_1 : S_MESH_1 + 3]
+    inverse = reals[INVERSE_RATIO]
+    if ring == RING_DYNAMIC:
+        gain = reals[GAIN]
+        torsion[0] = 0.0
+        torsion[1] = 1.0
+        torsion[2] = -reals[KAPPA]
+        meshing[0] = gain * (inverse + error[1])
+        meshing[1] = -1.0
+        meshing[2] = gain * (error[2] - reals[OUTPUT_SHARE])
+        curved_torsion = 0.0
+        curved_mesh = gain
+        twist = result[_mesh.TWIST]
+        mesh_twist = result[_mesh.MESH_TWIST]
+    else:
+        torsion[0] = inverse + error[1]
+        torsion[1] = 0.0
+        torsion[2] = error[2] - 1.0
+        meshing[:] = torsion
+        curved_torsion = 1.0
+        curved_mesh = 1.0
+        twist = angles[0] * inverse - angles[2] + error[0]
+        mesh_twist = twist
+    twist_rate = 0.0
+    mesh_rate = 0.0
+    for a in range(3):
+        twist_rate += torsion[a] * velocities[a]
+        mesh_rate += meshing[a] * velocities[a]
+    fill_inputs(t, integers, scratch, -result[_mesh.GRADIENT + 2], twist, twist_rate, mesh_twist, mesh_rate)
+    run_elements(integers, reals, scratch)
+
+    columns = integers[COLUMNS]
+    rows = OWN + integers[OWN_STATES]
+    outputs = scratch[S_INPUTS + columns : S_INPUTS + columns + rows]
+    kinetic = 0.0
+    supplied = outputs[SUPPLIED]
+    delivered = outputs[DELIVERED]
+    for a in range(3):
+        if ring != RING_DYNAMIC and a == 1:
+            continue
+        torque = (
+            outputs[a]
+            + outputs[TWIST_TORQUE] * torsion[a]
+            + outputs[MESH_TORQUE] * meshing[a]
+            - result[_mesh.GRADIENT + a]
+        )
+        inertia = reals[INERTIA + a]
+        kinetic += 0.5 * inertia * velocities[a] * velocities[a]
+        index = integers[STATE_OF + a]
+        if index >= 0:
+            scratch[S_ACCELERATIONS + a] = torque / inertia
+            scratch[S_CONSTRAINT + a] = 0.0
+            dy[index] = y[index + 1]
+            dy[index + 1] = torque / inertia - reals[LAMBDA + a] * scratch[S_ACCELERATIONS]
+        else:
+            constraint = inertia * scratch[S_ACCELERATIONS + a] - torque
+            scratch[S_CONSTRAINT + a] = constraint
+            if a == 0:
+                supplied += constraint * velocities[a]
+            else:
+                delivered -= constraint * velocities[a]
+    scratch[S_KINETIC] = kinetic
+    scratch[S_POTENTIAL] = result[_mesh.ENERGY] + outputs[STORED]
+    own = integers[OWN_STATES]
+    energies = integers[STATES] - 3
+    for k in range(own):
+        dy[energies - own + k] = outputs[OWN + k]
+    dy[energies] = supplied
+    dy[energies + 1] = delivered
+    dy[energies + 2] = outputs[DISSIPATED]
+    if want_jacobian == 0:
+        return
+
+    # Fold the dependent columns into those of the angles and velocities.
+    at = S_INPUTS + columns + rows
+    full = scratch[at : at + rows * columns].reshape((rows, columns))
+    vm = velocities[0]
+    vo = velocities[2]
+    bent_m = error[3] * vm + error[4] * vo
+    bent_o = error[4] * vm + error[5] * vo
+    for r in range(rows):
+        row = full[r]
+        d_tau = row[TRANSMITTED_TORQUE]
+        d_twist = row[TWIST]
+        d_rate = row[TWIST_RATE]
+        d_mesh = row[MESH_TWIST]
+        d_mesh_rate = row[MESH_TWIST_RATE]
+        if ring == RING_STATIC:
+            row[MOTOR_ANGLE] += row[RING_ANGLE] * scratch[S_RING_1]
+            row[OUTPUT_ANGLE] += row[RING_ANGLE] * scratch[S_RING_1 + 2]
+        for a in range(3):
+            row[2 * a] += d_twist * torsion[a] + d_mesh * meshing[a]
+            row[2 * a + 1] += d_rate * torsion[a] + d_mesh_rate * meshing[a]
+        bent = d_rate * curved_torsion + d_mesh_rate * curved_mesh
+        row[MOTOR_ANGLE] += bent * bent_m - d_tau * h_mo
+        row[OUTPUT_ANGLE] += bent * bent_o - d_tau * h_oo
+        row[RING_ANGLE] -= d_tau * h_fo
+    # Torque rows: the ports' rows through their levers, then the potential.
+    for a in range(3):
+        for c in range(columns):
+            full[a, c] += torsion[a] * full[TWIST_TORQUE, c] + meshing[a] * full[MESH_TORQUE, c]
+    bent = outputs[TWIST_TORQUE] * curved_torsion + outputs[MESH_TORQUE] * curved_mesh
+    full[0, MOTOR_ANGLE] += bent * error[3] - h_mm
+    full[0, RING_ANGLE] -= h_mf
+    full[0, OUTPUT_ANGLE] += bent * error[4] - h_mo
+    full[1, MOTOR_ANGLE] -= h_mf
+    full[1, RING_ANGLE] -= h_ff
+    full[1, OUTPUT_ANGLE] -= h_fo
+    full[2, MOTOR_ANGLE] += bent * error[4] - h_mo
+    full[2, RING_ANGLE] -= h_fo
+    full[2, OUTPUT_ANGLE] += bent * error[5] - h_oo
+    # Powers of the constraints: T = J alpha - Q.
+    for a in range(3):
+        if integers[SIGNAL_OF + a] < 0:
+            continue
+        sign = -velocities[a] if a == 0 else velocities[a]
+        target = SUPPLIED if a == 0 else DELIVERED
+        for c in range(columns):
+            full[target, c] += sign * full[a, c]
+        constraint = scratch[S_CONSTRAINT + a]
+        full[target, 2 * a + 1] += constraint if a == 0 else -constraint
+        jerk = scratch[S_INPUTS + integers[SIGNAL_OF + a] + 3]
+        full[target, TIME] -= sign * reals[INERTIA + a] * jerk
+    scatter(integers, reals, scratch, full, jacobian, dfdt)

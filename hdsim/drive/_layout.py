@@ -1,0 +1,47 @@
+"""Where the numbers of a drive's system stand: its integers, its reals and its scratch."""
+
+# Integers of the system.
+STATES = 0
+OWN_STATES = 1
+SIGNALS = 2
+ELEMENTS = 3
+TWISTS = 4
+MESH_ADDRESS = 5
+MESH_AT = 6
+RING = 7
+COLUMNS = 8
+REALS = 9
+SCRATCH = 10
+INTEGERS = 11
+STATE_OF = 12  # three: index of a coordinate's angle in y, or -1
+SIGNAL_OF = 15  # three: column of the signal that prescribes a coordinate, or -1
+LISTS = 20  # elements (address, parameters, own), twists (address, parameters), signals (address, parameters)
+
+RING_DYNAMIC = 0
+RING_STATIC = 1
+RING_ABSENT = 2
+RIGID = 3
+
+# Reals of the system; the kernels' parameters follow.
+INSIDE = 0
+INERTIA = 1  # three
+INVERSE_RATIO = 4
+GAIN = 5
+OUTPUT_SHARE = 6
+KAPPA = 7
+LAMBDA = 8  # three
+PARAMETERS = 16
+
+# Scratch, from its end of fixed size: found at the same place for every model.
+S_ANGLES = 0
+S_VELOCITIES = 3
+S_ACCELERATIONS = 6
+S_ERROR = 9
+S_MESH = 16
+S_TWIST_1 = 32  # first derivatives of the torsion twist over the three angles
+S_MESH_1 = 35  # of the mesh twist
+S_RING_1 = 38  # of the eliminated ring angle
+S_KINETIC = 41
+S_POTENTIAL = 42
+S_CONSTRAINT = 43  # three: torque that the prescription of a coordinate costs
+S_INPUTS = 48
