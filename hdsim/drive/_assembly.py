@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numba import carray
 
+from hdsim._abi import call_system
 from hdsim._compile import compiled
 from hdsim.drive._elastic import evaluate_elastic
 from hdsim.drive._layout import (
@@ -69,7 +70,7 @@ def drive_system(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, df
 
 
 @_jit
-def observe(times, states, integers, reals, inside, place, held, scratch, kept, rows):  # type: ignore[no-untyped-def]
+def observe(address, times, states, integers, reals, inside, place, held, scratch, kept, rows):  # type: ignore[no-untyped-def]
     """Evaluate at every sample and keep the first ``kept`` numbers of the scratch: shape (samples, kept).
 
     ``inside`` holds, for each sample, a time inside its smooth span; ``held`` what stood at ``place`` of the
@@ -82,7 +83,8 @@ def observe(times, states, integers, reals, inside, place, held, scratch, kept, 
         reals[INSIDE] = inside[k]
         if place >= 0:
             reals[place] = held[k]
-        evaluate_arrays(times[k], states[k], integers, reals, scratch, 0, dy, nothing, nothing)
+        call_system(address, times[k], states[k], integers, reals, scratch, 0, dy, nothing, nothing)
         for c in range(kept):
             rows[k, c] = scratch[c]
-        rows[k, kept : kept + n] = dy
+        for c in range(n):
+            rows[k, kept + c] = dy[c]

@@ -147,7 +147,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         torsion[0] = inverse + error[1]
         torsion[1] = 0.0
         torsion[2] = error[2] - 1.0
-        meshing[:] = torsion
+        for a in range(3):
+            meshing[a] = torsion[a]
         curved_torsion = 1.0
         curved_mesh = 1.0
         twist = angles[0] * inverse - angles[2] + error[0]
@@ -204,13 +205,13 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
 
     # Fold the dependent columns into those of the angles and velocities.
     at = S_INPUTS + columns + rows
-    full = scratch[at : at + rows * columns].reshape((rows, columns))
+    full = scratch[at : at + rows * columns]
     vm = velocities[0]
     vo = velocities[2]
     bent_m = error[3] * vm + error[4] * vo
     bent_o = error[4] * vm + error[5] * vo
     for r in range(rows):
-        row = full[r]
+        row = full[r * columns : (r + 1) * columns]
         d_tau = row[TRANSMITTED_TORQUE]
         d_twist = row[TWIST]
         d_rate = row[TWIST_RATE]
@@ -229,17 +230,19 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     # Torque rows: the ports' rows through their levers, then the potential.
     for a in range(3):
         for c in range(columns):
-            full[a, c] += torsion[a] * full[TWIST_TORQUE, c] + meshing[a] * full[MESH_TORQUE, c]
+            full[a * columns + c] += (
+                torsion[a] * full[TWIST_TORQUE * columns + c] + meshing[a] * full[MESH_TORQUE * columns + c]
+            )
     bent = outputs[TWIST_TORQUE] * curved_torsion + outputs[MESH_TORQUE] * curved_mesh
-    full[0, MOTOR_ANGLE] += bent * error[3] - h_mm
-    full[0, RING_ANGLE] -= h_mf
-    full[0, OUTPUT_ANGLE] += bent * error[4] - h_mo
-    full[1, MOTOR_ANGLE] -= h_mf
-    full[1, RING_ANGLE] -= h_ff
-    full[1, OUTPUT_ANGLE] -= h_fo
-    full[2, MOTOR_ANGLE] += bent * error[4] - h_mo
-    full[2, RING_ANGLE] -= h_fo
-    full[2, OUTPUT_ANGLE] += bent * error[5] - h_oo
+    full[MOTOR_ANGLE] += bent * error[3] - h_mm
+    full[RING_ANGLE] -= h_mf
+    full[OUTPUT_ANGLE] += bent * error[4] - h_mo
+    full[columns + MOTOR_ANGLE] -= h_mf
+    full[columns + RING_ANGLE] -= h_ff
+    full[columns + OUTPUT_ANGLE] -= h_fo
+    full[2 * columns + MOTOR_ANGLE] += bent * error[4] - h_mo
+    full[2 * columns + RING_ANGLE] -= h_fo
+    full[2 * columns + OUTPUT_ANGLE] += bent * error[5] - h_oo
     # Powers of the constraints: T = J alpha - Q.
     for a in range(3):
         if integers[SIGNAL_OF + a] < 0:
@@ -247,9 +250,9 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         sign = -velocities[a] if a == 0 else velocities[a]
         target = SUPPLIED if a == 0 else DELIVERED
         for c in range(columns):
-            full[target, c] += sign * full[a, c]
+            full[target * columns + c] += sign * full[a * columns + c]
         constraint = scratch[S_CONSTRAINT + a]
-        full[target, 2 * a + 1] += constraint if a == 0 else -constraint
+        full[target * columns + 2 * a + 1] += constraint if a == 0 else -constraint
         jerk = scratch[S_INPUTS + integers[SIGNAL_OF + a] + 3]
-        full[target, TIME] -= sign * reals[INERTIA + a] * jerk
+        full[target * columns + TIME] -= sign * reals[INERTIA + a] * jerk
     scatter(integers, reals, scratch, full, jacobian, dfdt)

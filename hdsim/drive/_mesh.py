@@ -64,7 +64,7 @@ CONSTANT_GAPS_AT = 27  # constant half-gaps of the teeth, twice over as the pitc
 HEADER = 28
 
 _jit: Any = compiled
-_inline: Any = compiled(inline="always")
+_inline: Any = compiled
 
 
 @_inline

@@ -81,7 +81,7 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
     rows = OWN + own
     outputs = scratch[S_INPUTS + columns : S_INPUTS + columns + rows]
     at = S_INPUTS + columns + rows
-    full = scratch[at : at + rows * columns].reshape((rows, columns))
+    full = scratch[at : at + rows * columns]
     free = integers[STATE_OF] >= 0
     tau = 0.0
     alpha = accelerations[0]
@@ -89,10 +89,13 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
     for _ in range(20):
         fill_inputs(t, integers, scratch, tau, 0.0, 0.0, 0.0, 0.0)
         run_elements(integers, reals, scratch)
-        gradient = 1.0 + full[OUTPUT_TORQUE, TRANSMITTED_TORQUE]
+        gradient = 1.0 + full[OUTPUT_TORQUE * columns + TRANSMITTED_TORQUE]
         if free:
             alpha = (outputs[MOTOR_TORQUE] + c * outputs[OUTPUT_TORQUE] - j_o * c * bend * vm * vm) / total
-            pulled = full[MOTOR_TORQUE, TRANSMITTED_TORQUE] + c * full[OUTPUT_TORQUE, TRANSMITTED_TORQUE]
+            pulled = (
+                full[MOTOR_TORQUE * columns + TRANSMITTED_TORQUE]
+                + c * full[OUTPUT_TORQUE * columns + TRANSMITTED_TORQUE]
+            )
             gradient -= j_o * c * pulled / total
         residual = tau - (j_o * (c * alpha + bend * vm * vm) - outputs[OUTPUT_TORQUE])
         if abs(residual) <= 1e-13 * (1.0 + abs(tau)):
@@ -135,7 +138,7 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
     turning = j_o * vm * vm * (above - below) / (2.0 * nudge)
     # The output's columns through the kinematics.
     for r in range(rows):
-        row = full[r]
+        row = full[r * columns : (r + 1) * columns]
         row[MOTOR_ANGLE] += c * row[OUTPUT_ANGLE] + bend * vm * row[OUTPUT_ANGLE + 1]
         row[MOTOR_ANGLE + 1] += c * row[OUTPUT_ANGLE + 1]
     # The transmitted torque's column through its own equation.
@@ -144,7 +147,7 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
             continue
         d_alpha = 0.0
         if free:
-            d_alpha = (full[MOTOR_TORQUE, k] + c * full[OUTPUT_TORQUE, k]) / total
+            d_alpha = (full[MOTOR_TORQUE * columns + k] + c * full[OUTPUT_TORQUE * columns + k]) / total
             if k == MOTOR_ANGLE + 1:
                 d_alpha -= 2.0 * j_o * c * bend * vm / total
             if k == MOTOR_ANGLE:
@@ -154,40 +157,44 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
                     - 2.0 * c * bend * j_o * alpha
                     - c * turning
                 ) / total
-        d_tau = j_o * c * d_alpha - full[OUTPUT_TORQUE, k]
+        d_tau = j_o * c * d_alpha - full[OUTPUT_TORQUE * columns + k]
         if k == MOTOR_ANGLE:
             d_tau += j_o * bend * alpha + turning
         if k == MOTOR_ANGLE + 1:
             d_tau += 2.0 * j_o * bend * vm
         d_tau /= gradient
         for r in range(rows):
-            full[r, k] += full[r, TRANSMITTED_TORQUE] * d_tau
+            full[r * columns + k] += full[r * columns + TRANSMITTED_TORQUE] * d_tau
         # A spare row keeps d tau for the constraint's power.
-        full[TWIST_TORQUE, k] = d_tau
+        full[TWIST_TORQUE * columns + k] = d_tau
     for k in range(columns):
-        full[MESH_TORQUE, k] = full[MOTOR_TORQUE, k]
+        full[MESH_TORQUE * columns + k] = full[MOTOR_TORQUE * columns + k]
         if free:
-            full[MOTOR_TORQUE, k] += c * full[OUTPUT_TORQUE, k]
+            full[MOTOR_TORQUE * columns + k] += c * full[OUTPUT_TORQUE * columns + k]
     if free:
-        full[MOTOR_TORQUE, MOTOR_ANGLE] += (
+        full[MOTOR_TORQUE * columns + MOTOR_ANGLE] += (
             bend * outputs[OUTPUT_TORQUE]
             - j_o * bend * bend * vm * vm
             - 2.0 * c * bend * j_o * alpha
             - c * turning
         )
-        full[MOTOR_TORQUE, MOTOR_ANGLE + 1] -= 2.0 * j_o * c * bend * vm
+        full[MOTOR_TORQUE * columns + MOTOR_ANGLE + 1] -= 2.0 * j_o * c * bend * vm
         for k in range(columns):
-            full[MOTOR_TORQUE, k] *= j_m / total
+            full[MOTOR_TORQUE * columns + k] *= j_m / total
     else:
         for k in range(columns):
             if k != TRANSMITTED_TORQUE and k != OUTPUT_ANGLE and k != OUTPUT_ANGLE + 1:
-                full[SUPPLIED, k] += vm * (c * full[TWIST_TORQUE, k] - full[MESH_TORQUE, k])
-        full[SUPPLIED, MOTOR_ANGLE] += vm * bend * tau
-        full[SUPPLIED, MOTOR_ANGLE + 1] += constraint
+                full[SUPPLIED * columns + k] += vm * (
+                    c * full[TWIST_TORQUE * columns + k] - full[MESH_TORQUE * columns + k]
+                )
+        full[SUPPLIED * columns + MOTOR_ANGLE] += vm * bend * tau
+        full[SUPPLIED * columns + MOTOR_ANGLE + 1] += constraint
         jerk = scratch[S_INPUTS + integers[SIGNAL_OF] + 3]
         d_tau = j_o * c * jerk / gradient
-        full[SUPPLIED, TIME] += vm * (j_m * jerk + (c - full[MESH_TORQUE, TRANSMITTED_TORQUE]) * d_tau)
+        full[SUPPLIED * columns + TIME] += vm * (
+            j_m * jerk + (c - full[MESH_TORQUE * columns + TRANSMITTED_TORQUE]) * d_tau
+        )
         for r in range(rows):
             if r != SUPPLIED:
-                full[r, TIME] += full[r, TRANSMITTED_TORQUE] * d_tau
+                full[r * columns + TIME] += full[r * columns + TRANSMITTED_TORQUE] * d_tau
     scatter(integers, reals, scratch, full, jacobian, dfdt)

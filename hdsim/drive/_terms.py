@@ -155,7 +155,7 @@ def scatter(integers, reals, scratch, full, jacobian, dfdt):  # type: ignore[no-
                 # The deviation's acceleration: this row less lambda times the motor's.
                 share = reals[LAMBDA + kind] * reals[INERTIA + kind] / reals[INERTIA]
                 for c in range(columns):
-                    full[kind, c] -= share * full[0, c]
+                    full[kind * columns + c] -= share * full[0 * columns + c]
         elif kind < 3 + own:
             state = first_own + kind - 3
             r = OWN + kind - 3
@@ -165,7 +165,7 @@ def scatter(integers, reals, scratch, full, jacobian, dfdt):  # type: ignore[no-
             state = energies + which
             r = SUPPLIED if which == 0 else (DELIVERED if which == 1 else DISSIPATED)
             factor = 1.0
-        row = full[r]
+        row = full[r * columns : (r + 1) * columns]
         slope = row[TIME]
         by_angle = row[0]
         by_velocity = row[1]

@@ -61,6 +61,7 @@ class Observer:
         system = self.model.system
         rows = np.empty((len(times), self._kept + system.size))
         observe(
+            system.kernel.address,
             times,
             np.ascontiguousarray(states),
             system.integers,
