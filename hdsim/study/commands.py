@@ -71,9 +71,9 @@ def bench(
 @click.argument("name", required=False)
 def presets(name: str | None) -> None:
     """List the drives that are ready to use, or what is printed about the one called NAME."""
-    from rich.console import Console
     from rich.table import Table
 
+    from hdsim.console import console
     from hdsim.drive.catalogue import Figure
     from hdsim.drive.presets import catalogue_figures, preset_names
     from hdsim.errors import InputError
@@ -99,7 +99,7 @@ def presets(name: str | None) -> None:
                 value.source.confidence,
                 value.source.citation,
             )
-        Console().print(table)
+        console().print(table)
         return
     columns = ("ratio", "rated torque, N m", "K1, N m/rad", "K3, N m/rad", "accuracy, arcmin")
     table = Table("preset", title="Presets")
@@ -115,7 +115,7 @@ def presets(name: str | None) -> None:
             f"{figures.stiffness_k3.value:g}",
             f"{figures.accuracy.value * 3437.7467707849396:.2g}",
         )
-    Console().print(table)
+    console().print(table)
 
 
 def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any], dict[str, Line]]:
@@ -150,7 +150,7 @@ def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, A
 
 def _print(rows: list[Row], title: str) -> None:
     """The figures as a table."""
-    from rich.console import Console
+    from hdsim.console import console
     from rich.table import Table
 
     table = Table(title=title)
@@ -174,7 +174,7 @@ def _print(rows: list[Row], title: str) -> None:
             verdict,
         )
         last = row.procedure
-    Console().print(table)
+    console().print(table)
 
 
 def _save(figure: Any, path: Path) -> Path:
@@ -211,3 +211,34 @@ def _progress() -> AbstractContextManager[Callable[[str, float, float], object] 
             yield lambda label, t, end: shown.update(task, description=label, completed=t, total=end)
 
     return bar()
+
+
+@click.command(short_help="Simulate a preset's catalogue lines; print both with the error.")
+@click.argument("preset")
+def catalogue(preset: str) -> int:
+    """Measure every line that the catalogue prints of PRESET on the drive without further effects.
+
+    Stiffness, friction, efficiency, resonance and tooth load, each beside the printed or analytic value with
+    its error. Exit status 1 when one is outside its tolerance.
+    """
+    from rich.table import Table
+
+    from hdsim.console import console
+    from hdsim.study.catalogue import catalogue_table
+
+    lines = catalogue_table(preset)
+    table = Table(title=f"{preset}: catalogue and simulation", title_justify="left", title_style="bold")
+    for name in ("quantity", "catalogue", "simulated", "unit", "error", "allowed", "holds"):
+        table.add_column(name, justify="left" if name in ("quantity", "unit", "holds") else "right")
+    for line in lines:
+        error, allowed = f"{100 * line.deviation:+.2f} %", f"{100 * line.tolerance:.0f} %"
+        if line.absolute:
+            error, allowed = f"{line.deviation:+.3f}", f"{line.tolerance:g}"
+        holds = "yes" if line.holds else "NO"
+        table.add_row(
+            line.quantity, f"{line.catalogue:.4g}", f"{line.simulated:.4g}", line.unit, error, allowed, holds
+        )
+    console().print(table)
+    sources = dict.fromkeys(line.source for line in lines)
+    click.echo("Sources: " + "; ".join(sources))
+    return 0 if all(line.holds for line in lines) else 1
