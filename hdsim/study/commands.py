@@ -150,8 +150,9 @@ def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, A
 
 def _print(rows: list[Row], title: str) -> None:
     """The figures as a table."""
-    from hdsim.console import console
     from rich.table import Table
+
+    from hdsim.console import console
 
     table = Table(title=title)
     table.add_column("test")
