@@ -25,7 +25,7 @@ from numpy_drive import NumpyDrive, disagreement
 from scipy.integrate import solve_ivp
 
 import hdsim
-from hdsim.drive import _assembly
+from hdsim.drive import _layout
 from hdsim.simulation.rosenbrock import bare_rodas4
 from hdsim.simulation.setup import build_run
 from hdsim.simulation.solvers import integrate
@@ -91,7 +91,7 @@ class Bench:
         # There and back; quick: only there. The motor passes its highest speed twice or once.
         self.t_end = 0.125 if quick else 0.25
         self.t_eval = np.linspace(0.0, self.t_end, round(self.t_end * SAMPLES_PER_S) + 1)
-        self.system.reals[_assembly.INSIDE] = 0.5 * self.t_end
+        self.system.reals[_layout.INSIDE] = 0.5 * self.t_end
         self.numpy = NumpyDrive(scenario, self.simulation.model)
         self.quick = quick
 
@@ -212,7 +212,7 @@ def draw(curves, path):
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(figsize=(9, 6), layout="constrained")
+    figure, axes = pyplot.subplots(figsize=(10, 5.5), layout="constrained")
     styles = {"rodas4": "o-", "compiled": "s-", "numpy": "^--", "CVODE": "D-"}
     for k, (name, curve) in enumerate(curves.items()):
         style = next(value for key, value in styles.items() if name.startswith(key))
@@ -224,7 +224,7 @@ def draw(curves, path):
     axes.set_ylabel("worst relative RMS error of twist, output torque, tracking error")
     axes.set_title("Seed drive, 200 teeth, closed loop on a sine, motor up to 70 turns a second")
     axes.grid(which="both", alpha=0.25)
-    axes.legend(fontsize=9)
+    figure.legend(loc="outside right upper", fontsize=9)
     figure.savefig(path, dpi=120)
 
 
