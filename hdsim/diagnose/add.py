@@ -89,7 +89,12 @@ def fitted_numbers(added: Added, covariance: Array, shape_spreads: Array) -> dic
         if isinstance(term, Amplitude):
             for path, unit in term.units.items():
                 low = c[at] - spread[at] if term.signed else max(c[at] - spread[at], 0.0)
-                found[path] = _value(unit * c[at], unit * low, unit * (c[at] + spread[at]))
+                below = found.get(path)
+                if below is None:
+                    found[path] = _value(unit * c[at], unit * low, unit * (c[at] + spread[at]))
+                else:
+                    value, half = below.value + unit * c[at], unit * spread[at]
+                    found[path] = _value(value, value - half, value + half)
             at += 1
         elif isinstance(term, Inverse):
             low, high = max(c[at] - spread[at], 1e-9), c[at] + spread[at]

@@ -64,10 +64,12 @@ class Added:
             put(data, shape.path, value)
         at = 0
         c = self.coefficients
+        total: dict[str, float] = {}
         for term in self.fitting.terms:
             if isinstance(term, Amplitude):
                 for path, unit in term.units.items():
-                    put(data, path, c[at] * unit)
+                    put(data, path, c[at] * unit + total.get(path, 0.0))
+                    total[path] = total.get(path, 0.0) + c[at] * unit
                 at += 1
             elif isinstance(term, Inverse):
                 put(data, term.path, term.unit / max(c[at], STIFF))
@@ -165,17 +167,19 @@ _PRIORS = {
 }
 
 
-def base_freedoms(state: State, channels: Sequence[str]) -> list[Free]:
+def base_freedoms(state: State, channels: Sequence[str], *, load_known: bool = False) -> list[Free]:
     """Numbers that the model has and that a fit may move: the zero ones stay zero.
 
     Args:
         state: the model.
         channels: the predicted channels; the torque's sensitivity is free when the motor's torque is one.
+        load_known: the output's torque is measured and given, so nothing of the load is free.
     """
     drive, load = state.drive, state.load
     found = [_free("drive.inertia.motor_kg_m2", drive.inertia.motor_kg_m2, "kg m^2")]
-    found.append(_free("load.inertia_kg_m2", load.inertia_kg_m2, "kg m^2"))
-    if load.gravity is not None:
+    if not load_known:
+        found.append(_free("load.inertia_kg_m2", load.inertia_kg_m2, "kg m^2"))
+    if load.gravity is not None and not load_known:
         found.append(_free("load.gravity.mass_kg", load.gravity.mass_kg, "kg"))
     if drive.mesh.model != "rigid":
         paths = tuple(f"drive.torsion.stiffness_k{k}_nm_per_rad" for k in (1, 2, 3))
@@ -195,7 +199,7 @@ def base_freedoms(state: State, channels: Sequence[str]) -> list[Free]:
                 path = f"effects.{name}.{field_name}"
                 found.append(Free(path, (path,), 0.7, value, field_name.rpartition("_nm")[1].strip("_")))
     if "motor_torque" in channels:
-        found.append(Free("motor_torque_gain", ("gain",), 0.3, state.gain, "1"))
+        found.append(Free("motor_torque_gain", ("gain",), 0.15, state.gain, "1"))
     return [free for free in found if free.value > 0]
 
 

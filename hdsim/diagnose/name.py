@@ -115,6 +115,9 @@ def screen(
         for fitting in fittings:
             if any(channel not in bench.channels for channel in fitting.needs):
                 continue
+            if behind_sensor(bench, state, name, fitting):
+                found.skipped[name] = "acts on the load's side of the torque sensor, whose reading is the load"
+                continue
             for added in starts(name, fitting, lines):
                 columns = traces(bench, state, predictions, added)
                 if columns is None or not np.any(columns):
@@ -149,17 +152,42 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line]) -> list[Added]:
     ]
 
 
+def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bool:
+    """Whether an effect acts on the output, in records whose load is what the output's torque sensor reads.
+
+    Such an effect changes the torque that the sensor has measured already, so it cannot be missing there.
+    """
+    first = bench.predictors[0]
+    if first.plan.load != "output_torque":
+        return False
+    for added in starts(name, fitting, ())[:1]:
+        try:
+            without = first.predict(state.candidate())
+            tried = replace(state, added=(*state.added, added))
+            there = first.predict(tried.candidate())
+        except PredictionError:
+            return True
+        torque = float(np.std(there["output_torque"] - without["output_torque"])) / abs(first.ratio)
+        motor = float(np.std(there.get("motor_torque", np.zeros(1)) - without.get("motor_torque", 0.0)))
+        return torque > 0.5 * motor and torque > 0.0
+    return False
+
+
 def traces(bench: Bench, state: State, predictions: Sequence[Array], added: Added) -> Array | None:
     """Change of the whitened predictions for each coefficient at 1 alone, shape (rows, k)."""
     columns = []
+    before = predictions
     for k in range(len(added.coefficients)):
-        unit = tuple(1.0 if j == k else 0.0 for j in range(len(added.coefficients)))
+        below = 1.0 if added.fitting.cumulative else 0.0
+        unit = tuple(1.0 if j == k else below if j < k else 0.0 for j in range(len(added.coefficients)))
         tried = replace(state, added=(*state.added, replace(added, coefficients=unit)))
         try:
             there = bench.predict(tried.candidate(), tried.gain)
         except PredictionError:
             return None
-        columns.append(trace(bench, predictions, there))
+        columns.append(trace(bench, before, there))
+        if added.fitting.cumulative:
+            before = there
     return np.column_stack(columns)
 
 

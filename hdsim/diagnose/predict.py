@@ -190,6 +190,9 @@ class Predictor:
         for channel in self.plan.channels:
             source = f"measured_{channel}" if f"measured_{channel}" in got else channel
             found[channel] = _interpolated(got.time, got[source], at)
+        if self.plan.load == "output_torque":
+            # Not compared, but it tells an effect that acts behind the sensor, where none can be seen.
+            found["output_torque"] = _interpolated(got.time, got["output_torque"], at)
         return found
 
 

@@ -43,7 +43,8 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         state: the base model.
         frees: numbers that may move; all that the base has when None.
     """
-    freedoms = list(base_freedoms(state, bench.channels) if frees is None else frees)
+    known = all(predictor.plan.load == "output_torque" for predictor in bench.predictors)
+    freedoms = list(base_freedoms(state, bench.channels, load_known=known) if frees is None else frees)
     before = bench.predict(state.candidate(), state.gain)
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5)

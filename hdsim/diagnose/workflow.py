@@ -180,7 +180,7 @@ def diagnose(
         "seconds": seconds,
     }
     if unknown:
-        place = stages[0].location.places[0]
+        place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
         suspects = {n.name: round(float(s.screening.ranked[0].share.share), 3)
                     for n, s in zip(named, stages, strict=False) if s.screening}  # fmt: skip
         verdict = Verdict(

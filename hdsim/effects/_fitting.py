@@ -74,6 +74,7 @@ class Fitting:
         settings: fields that stay as given here, nested.
         label: tells this way from the effect's others.
         needs: channels without which it cannot be told.
+        cumulative: a term has a meaning only on top of those before it, and adds to their fields.
     """
 
     terms: tuple[Amplitude | Inverse | Harmonic | Periodic, ...]
@@ -81,3 +82,4 @@ class Fitting:
     settings: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
     needs: tuple[str, ...] = ()
+    cumulative: bool = False
