@@ -26,7 +26,7 @@ def averages(D: float, G_m: float) -> NDArray[np.float64]:
 
 def length(value: float) -> str:
     """A length with a readable unit."""
-    return f"{value * 1e6:.3g} um" if value > 1e-8 else f"{value * 1e6:.3e} um"
+    return f"{value * 1e6:.3g} um" if value > 1e-8 else f"{value * 1e9:.3g} nm"
 
 
 @check(*_TABLE)
@@ -36,7 +36,7 @@ def table_4() -> Iterator[Row]:
         gaps = averages(D, G)
         mean, spread = float(gaps.mean()), float(gaps.std() / gaps.mean())
         single = single_frequency_half_gap(Flank(D, G))
-        computed = f"{length(mean)} (one draw: +-{100 * spread:.0f} %); single wave {length(single)}"
+        draw = f"(one draw: +-{100 * spread:.0f} %); single wave {length(single)}"
         values = {"mean_m": mean, "relative_spread": spread, "single_wave_m": single}
         if printed is None:
             yield Row(
@@ -44,7 +44,7 @@ def table_4() -> Iterator[Row]:
                 "Table 4 (backlash)",
                 f"average backlash, D = {D:g}, G = {G:g} m",
                 "cell empty",
-                computed,
+                f"{length(mean)} {draw}",
                 Verdict.OPEN,
                 "the value is missing; both readings give about the same",
                 f"{length(mean)}",
@@ -57,7 +57,7 @@ def table_4() -> Iterator[Row]:
             "Table 4 (backlash)",
             f"average backlash, D = {D:g}, G = {G:g} m",
             length(printed),
-            f"{computed}; {100 * error:+.1f} %",
+            f"{length(mean)}, {100 * error:+.1f} % {draw}",
             Verdict.REPRODUCED if abs(error) < 0.07 else Verdict.CONTRADICTED,
             f"mean |z| over 0..L of the full sum, L = {SAMPLING_LENGTH_M * 1e3:.1f} mm, {HIGHEST_INDEX + 1} "
             f"frequencies, {DRAWS} phase draws; the paper states neither L nor the averaging, and prints one "

@@ -18,7 +18,7 @@ import click
     multiple=True,
     help="Form of the report; repeatable. Default: html.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the table.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the list.")
 def reproduce(
     only: tuple[str, ...], listed: bool, output: Path | None, forms: tuple[str, ...], as_json: bool
 ) -> None:
@@ -27,7 +27,7 @@ def reproduce(
     reproduced: follows from the paper's equations. contradicted: does not, with the correction beside it.
     not determined by the paper: it leaves something open.
     """
-    from hdsim.reproduce.report import print_table, to_json, write
+    from hdsim.reproduce.report import print_rows, to_json, write
     from hdsim.reproduce.rows import compute, names
 
     if listed:
@@ -37,7 +37,7 @@ def reproduce(
     if as_json:
         click.echo(to_json(rows))
     else:
-        print_table(rows)
+        print_rows(rows)
     if output is not None:
         for form in forms or ("html",):
             for file in write(rows, output, form):

@@ -159,7 +159,8 @@ def noisy() -> Iterator[Row]:
     yield Row(
         "round-trip-noise",
         "Table 3, section 2.4",
-        f"the same with {NOISE_M * 1e9:.0f} nm rms noise (a step of 200 nm / sqrt 12), averaged pair",
+        f"D and G from one profile with {NOISE_M * 1e9:.0f} nm rms noise (steps of 200 nm / sqrt 12), "
+        "averaged pair",
         "not mentioned",
         f"without correction D is {np.median(plain.D_error):+.2f} off (warned: "
         f"{100 * plain.warned.mean():.0f} %), G "

@@ -1,31 +1,23 @@
-"""Rows as a terminal table, JSON, Markdown and HTML."""
+"""Rows on the terminal, as JSON and Markdown, and written to files."""
 
 from __future__ import annotations
 
 import json
-from base64 import b64encode
 from collections import Counter
-from html import escape
 from pathlib import Path
-
-from rich.console import Console
-from rich.table import Table
+from typing import TYPE_CHECKING
 
 from hdsim.errors import InputError
+from hdsim.reproduce.page import CITATION, DOI, OPENING, TITLE, TONE, headlines, sections, to_html
 from hdsim.reproduce.rows import Row, Verdict
 
-TITLE = "Zhang et al. (2021), recomputed"
-INTRODUCTION = (
-    "Every equation, table, figure and printed number of Zhang, Liu, Yang, Wang and Liu (2021), Study on "
-    "gear contact "
-    "stiffness and backlash of harmonic drive based on fractal theory (doi:10.21203/rs.3.rs-652069/v1), "
-    "computed again "
-    "from the equations. The model holds together: the asperity integrals, the backlash table and the "
-    "near-linear "
-    "stiffness are reproduced. Where a printed equation or claim does not follow, the corrected one "
-    "stands beside it."
-)
+if TYPE_CHECKING:
+    from rich.console import Console
+
 _STYLE = {Verdict.REPRODUCED: "green", Verdict.CONTRADICTED: "red", Verdict.OPEN: "yellow"}
+
+#: Longer lines are hard to read.
+_WIDEST = 120
 
 
 def summary(rows: list[Row]) -> str:
@@ -34,25 +26,38 @@ def summary(rows: list[Row]) -> str:
     return ", ".join(f"{count[verdict]} {verdict}" for verdict in Verdict)
 
 
-def print_table(rows: list[Row], console: Console | None = None) -> None:
-    """Print the rows to the terminal."""
-    table = Table(title=TITLE, show_lines=True)
-    for name in ("source", "statement", "paper", "hdsim", "verdict", "reason"):
-        table.add_column(name, overflow="fold")
+def print_rows(rows: list[Row], console: Console | None = None) -> None:
+    """Print the rows to the terminal, a block each, so that they are readable at any width."""
+    import textwrap
+
+    from rich.text import Text
+
+    from hdsim.console import console as standard
+
+    shown = console or standard()
+    width = min(shown.width, _WIDEST)
     for row in rows:
-        reason = row.reason + (f"\nCorrected: {row.correction}" if row.correction else "")
-        cells = [
-            row.source,
-            row.statement,
-            row.paper,
-            row.computed,
-            f"[{_STYLE[row.verdict]}]{row.verdict}[/]",
-            reason,
-        ]
-        table.add_row(*(c if i == 4 else c.replace("[", r"\[") for i, c in enumerate(cells)))
-    console = console or Console()
-    console.print(table)
-    console.print(summary(rows))
+        title = Text.assemble(
+            (f"{row.source}  ", "bold"),
+            (row.verdict, f"bold {_STYLE[row.verdict]}"),
+            (f"  {row.name}", "dim"),
+        )
+        shown.print(title, soft_wrap=True)
+        for name, text in (
+            ("", row.statement), ("paper", row.paper), ("hdsim", row.computed), ("why", row.reason),
+            ("corrected", row.correction),
+        ):  # fmt: skip
+            if text:
+                first = f"  {name:<11}" if name else "  "
+                lines = textwrap.wrap(
+                    text, width, initial_indent=first, subsequent_indent=" " * len(first),
+                    break_long_words=False, break_on_hyphens=False,
+                )  # fmt: skip
+                block = Text("\n".join(lines))
+                block.stylize("dim" if name else "", 0, len(first))
+                shown.print(block, soft_wrap=True)
+        shown.print()
+    shown.print(f"{TITLE}: {summary(rows)}", markup=False, highlight=False)
 
 
 def to_json(rows: list[Row]) -> str:
@@ -74,52 +79,17 @@ def to_markdown(rows: list[Row], figures: dict[str, str]) -> str:
     def cell(text: str) -> str:
         return text.replace("|", r"\|").replace("<", "&lt;").replace("*", r"\*").replace("\n", " ")
 
-    lines = [f"# {TITLE}", "", INTRODUCTION, "", f"{summary(rows)}.", ""]
-    lines += ["| source | statement | paper | hdsim | verdict | reason | corrected |", "|" + "---|" * 7]
-    for r in rows:
-        cells = (r.source, r.statement, r.paper, r.computed, f"**{r.verdict}**", r.reason, r.correction)
-        lines.append("| " + " | ".join(c if i == 4 else cell(c) for i, c in enumerate(cells)) + " |")
+    lines = [f"# {TITLE}", "", f"{CITATION}, [doi:{DOI}](https://doi.org/{DOI})", "", OPENING, ""]
+    lines += [f"{summary(rows)}.", "", *(f"* {cell(sentence)}" for sentence in headlines(rows)), "", TONE]
+    for title, about, members in sections(rows):
+        lines += ["", f"## {title}", "", *([about, ""] if about else [])]
+        lines += ["| source | statement | paper | hdsim | verdict | reason | corrected |", "|" + "---|" * 7]
+        for r in members:
+            cells = (r.source, r.statement, r.paper, r.computed, f"**{r.verdict}**", r.reason, r.correction)
+            lines.append("| " + " | ".join(c if i == 4 else cell(c) for i, c in enumerate(cells)) + " |")
     for file, caption in figures.items():
         lines += ["", f"![{caption}]({file})", "", f"*{caption}*"]
     return "\n".join(lines) + "\n"
-
-
-def to_html(rows: list[Row], figures: dict[str, tuple[str, bytes]]) -> str:
-    """One self-contained page.
-
-    Args:
-        rows: the rows.
-        figures: caption and PNG by name.
-    """
-    colour = {Verdict.REPRODUCED: "#e3f4e3", Verdict.CONTRADICTED: "#fbe3e3", Verdict.OPEN: "#fbf4d9"}
-    head = "".join(
-        f"<th>{h}</th>" for h in ("source", "statement", "paper", "hdsim", "verdict", "reason, correction")
-    )
-    body = ""
-    for r in rows:
-        reason = escape(r.reason) + (
-            f"<p><b>Corrected:</b> {escape(r.correction)}</p>" if r.correction else ""
-        )
-        cells = [escape(text) for text in (r.source, r.statement, r.paper, r.computed)]
-        cells += [f"<b>{escape(r.verdict)}</b>", reason]
-        row = "".join(f"<td>{c}</td>" for c in cells)
-        body += f'<tr id="{escape(r.name)}" style="background:{colour[r.verdict]}">{row}</tr>\n'
-    pictures = "".join(
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{b64encode(png).decode()}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>\n"
-        for caption, png in figures.values()
-    )
-    style = (
-        "body{font:15px/1.45 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em}"
-        "table{border-collapse:collapse}td,th{border:1px solid #ccc;padding:.4em .6em;vertical-align:top;"
-        "text-align:left}img{max-width:100%}figure{margin:1.5em 0}p{margin:.4em 0}"
-    )
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        f"<title>{TITLE}</title><style>{style}</style></head>"
-        f"<body><h1>{TITLE}</h1><p>{escape(INTRODUCTION)}</p><p><b>{escape(summary(rows))}</b></p>"
-        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{pictures}</body></html>\n"
-    )
 
 
 def write(rows: list[Row], folder: Path, form: str) -> list[Path]:
@@ -128,7 +98,7 @@ def write(rows: list[Row], folder: Path, form: str) -> list[Path]:
     Raises:
         InputError: when the folder cannot be written, or the form is unknown.
     """
-    from hdsim.reproduce.figures import draw
+    from hdsim.reproduce.figures import FIGURES, draw
 
     if form not in ("json", "markdown", "html"):
         raise InputError(f"form must be json, markdown or html, found {form!r}")
@@ -137,7 +107,8 @@ def write(rows: list[Row], folder: Path, form: str) -> list[Path]:
     if form == "json":
         files["reproduction.json"] = to_json(rows).encode()
     elif form == "html":
-        files["reproduction.html"] = to_html(rows, figures).encode()
+        places = {name: patterns for name, (_, patterns, _) in FIGURES.items()}
+        files["reproduction.html"] = to_html(rows, figures, places).encode()
     else:
         files |= {f"{name}.png": png for name, (_, png) in figures.items()}
         captions = {f"{name}.png": caption for name, (caption, _) in figures.items()}
