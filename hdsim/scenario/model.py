@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from pydantic import BaseModel, Field, create_model
+from pydantic import BaseModel, Field, create_model, model_validator
 
 from hdsim.actuation.command import Command
 from hdsim.actuation.loads import Load
@@ -13,7 +13,7 @@ from hdsim.drive.parameters import Drive
 from hdsim.effects import catalogue
 from hdsim.parts import Effect, Parameters
 from hdsim.scenario.extends import read
-from hdsim.scenario.settings import LogOptions, Run
+from hdsim.scenario.settings import LiveOptions, LogOptions, Run
 from hdsim.scenario.validation import build
 from hdsim.scenario.writer import to_yaml
 
@@ -63,6 +63,18 @@ class Scenario(Parameters):
     """How the model is integrated and sampled."""
     log: LogOptions = LogOptions()
     """What the log contains."""
+    live: LiveOptions = LiveOptions()
+    """What may be changed while it runs, for ``hdsim run --live``."""
+
+    @model_validator(mode="after")
+    def _live_numbers(self) -> Scenario:
+        for name in self.live.parameters:
+            found: Any = self
+            for part in name.split("."):
+                found = getattr(found, part, None)
+            if isinstance(found, bool) or not isinstance(found, int | float):
+                raise ValueError(f"live.parameters: {name} is no number that this scenario states")
+        return self
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Scenario:
@@ -82,7 +94,7 @@ class Scenario(Parameters):
     def to_yaml(self) -> str:
         """The whole scenario as YAML: defaults, presets and extended files resolved, paths absolute."""
         data = self.model_dump(mode="json")
-        for section in ("effects", "command", "load", "run", "log"):
+        for section in ("effects", "command", "load", "run", "log", "live"):
             data[section] = _without_unset(getattr(self, section), data[section])
         return to_yaml(data)
 

@@ -11,6 +11,9 @@ from hdsim.parts import Parameters
 #: Integration methods, by name: hdsim's own and those of ``scipy.integrate.solve_ivp``.
 Method = Literal["rodas4", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 
+#: What a run can stand to have changed: it moves no body and stores no energy.
+LIVE_SECTIONS = ("load.torque.", "command.motor.controller.", "command.motor.torque.")
+
 
 class Start(Parameters):
     """State at the start; the drive's own twist follows from it."""
@@ -59,3 +62,20 @@ class LogOptions(Parameters):
     """Compression of the log's chunks."""
     scene: bool = True
     """Write the three-dimensional scene that Foxglove shows."""
+
+
+class LiveOptions(Parameters):
+    """What viewers may do to a run that is watched while it is simulated."""
+
+    parameters: tuple[str, ...] = ()
+    """Numbers that may be changed while it runs, by their dotted names, such as load.torque.torque_nm or
+    command.motor.controller.velocity_gain_nm_s_per_rad: of the external torque, the controller, or the
+    commanded torque."""
+
+    @model_validator(mode="after")
+    def _allowed(self) -> LiveOptions:
+        for name in self.parameters:
+            if not name.startswith(LIVE_SECTIONS):
+                allowed = ", ".join(section + "..." for section in LIVE_SECTIONS)
+                raise ValueError(f"{name!r} may not be changed while it runs; allowed: {allowed}")
+        return self

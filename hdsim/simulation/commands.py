@@ -19,7 +19,24 @@ if TYPE_CHECKING:
 )
 @click.option("--plot/--no-plot", default=True, show_default=True, help="Draw the figure beside the log.")
 @click.option("--verify/--no-verify", default=True, show_default=True, help="Check the log after the run.")
-def run(scenario: Path, output: Path | None, plot: bool, verify: bool) -> int:
+@click.option("--live", is_flag=True, help="Stream to viewers while it simulates (needs hdsim[live]).")
+@click.option(
+    "--speed",
+    type=click.FloatRange(1e-4, 1e4),
+    default=1.0,
+    show_default=True,
+    help="Of --live, to real time.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8765,
+    show_default=True,
+    help="Of --live; 0: any free one.",
+)
+def run(
+    scenario: Path, output: Path | None, plot: bool, verify: bool, live: bool, speed: float, port: int
+) -> int:
     """Simulate SCENARIO, write its log, and draw its figure."""
     import hdsim
     from hdsim.errors import InputError
@@ -35,8 +52,20 @@ def run(scenario: Path, output: Path | None, plot: bool, verify: bool) -> int:
 
     from hdsim.simulation.simulate import simulate_to_log
 
-    with progress(loaded.run.duration_s, f"{loaded.name}") as on_time:
-        done = simulate_to_log(loaded, path, on_time=on_time)
+    session = None
+    if live:
+        from hdsim.live.session import LiveRun
+
+        session = LiveRun(loaded, speed=speed, port=port)
+        click.echo(f"live     {session.address}")
+    try:
+        with progress(loaded.run.duration_s, f"{loaded.name}") as on_time:
+            done = simulate_to_log(loaded, path, on_time=on_time, live=session)
+        if session is not None:
+            session.finish()
+    finally:
+        if session is not None:
+            session.close()
     tell(done, loaded.run.duration_s)
     click.echo(f"log      {path}")
     if verify:

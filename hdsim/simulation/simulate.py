@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from hdsim.simulation.run import Run, RunFailed
 from hdsim.simulation.setup import build_run
 
 if TYPE_CHECKING:
+    from mcap import records
+
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
 
@@ -52,8 +54,31 @@ def simulate(
     return recording
 
 
+class Spectator(Protocol):
+    """Who watches a run while it is simulated (``hdsim.live``)."""
+
+    def attach(self, run: Run) -> None:
+        """Called before the run begins."""
+
+    def watch(
+        self,
+        schema: records.Schema,
+        channel: records.Channel,
+        log_times: Sequence[int],
+        bodies: Sequence[bytes],
+    ) -> None:
+        """Called with messages as they are written to the log."""
+
+    def computed(self, time: float) -> None:
+        """Called when the log is complete up to a time, s."""
+
+
 def simulate_to_log(
-    scenario: Scenario, path: str | Path, *, on_time: Callable[[float], object] | None = None
+    scenario: Scenario,
+    path: str | Path,
+    *,
+    on_time: Callable[[float], object] | None = None,
+    live: Spectator | None = None,
 ) -> Run:
     """Simulate a scenario and write its log block by block, so that a stopped run keeps what it computed.
 
@@ -61,6 +86,7 @@ def simulate_to_log(
         scenario: what to simulate.
         path: the log; ``<path>.partial`` until it is complete.
         on_time: called now and then with the simulated time that has been reached, s.
+        live: watches the run while it is simulated.
 
     Returns:
         The run, with audit, statistics and, if it stopped early, its ``failure``.
@@ -79,7 +105,10 @@ def simulate_to_log(
         attachments={"scenario.yaml": scenario.to_yaml()},
         view_rate_hz=view_rate(scenario.run.duration_s),
         compression=scenario.log.compression,
+        watch=None if live is None else live.watch,
     ) as log:
+        if live is not None:
+            live.attach(run)
         scene = None
         if scenario.log.scene:
             geometry = SceneGeometry.from_metadata(metadata)
@@ -98,9 +127,13 @@ def simulate_to_log(
             for event in run.events[told:]:
                 log.write_event(event)
             told = len(run.events)
+            if live is not None:
+                live.computed(float(tables["state"].time[-1]))
         for event in run.events[told:]:
             log.write_event(event)
         log.close(summary(run, time.perf_counter() - started))
+        if live is not None:
+            live.computed(scenario.run.duration_s)
     if run.interrupted is not None:
         raise run.interrupted
     return run
