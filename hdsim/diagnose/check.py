@@ -168,10 +168,19 @@ def find_spikes(values: Array, trusted: Mask) -> Mask:
     scale = np.maximum(scale, 1e-9 * np.ptp(values[trusted]))
     spikes = (deviation > SPIKE_DEVIATIONS * scale) & trusted
     runs, count = label(spikes)
-    if count:
-        lengths = np.bincount(runs.ravel())
-        lengths[0] = 0
-        spikes &= ~(lengths > LONGEST_SPIKE)[runs]
+    for k in range(1, count + 1):
+        where = np.flatnonzero(runs == k)
+        first, last = where[0], where[-1]
+        before, after = (
+            filled[max(0, first - SPIKE_WINDOW // 2) : first],
+            filled[last + 1 :][: SPIKE_WINDOW // 2],
+        )
+        around = np.concatenate([before, after])
+        # A spike leaves the range of its neighbours and comes back; a step or a corner does not.
+        beyond = np.maximum(filled[where] - around.max(), around.min() - filled[where])
+        least = max(0.5 * SPIKE_DEVIATIONS * float(scale[where].min()), float(np.ptp(around)))
+        if len(where) > LONGEST_SPIKE or beyond.max() < least:
+            spikes[where] = False
     return np.asarray(spikes)
 
 

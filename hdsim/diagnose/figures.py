@@ -88,7 +88,7 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
                 axes.set_ylabel("amplitude")
                 axes.set_ylim(bottom=0)
             else:
-                x = coordinates(bench, series)[place.coordinate]
+                x = coordinates(bench, series, residuals)[place.coordinate]
                 thin = max(1, len(x) // POINTS)
                 rows = np.flatnonzero(series.train)[::thin]
                 axes.plot(x[rows], values[rows], ".", markersize=1.5, color=style.GREY, alpha=0.5)

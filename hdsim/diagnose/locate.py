@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +18,8 @@ CORNERS = 9
 LOBES = (1.0, 2.0, 3.0, 4.0)
 #: Order spectra: densely up to the first number, at integers up to the second.
 DENSE_ORDER, HIGHEST_ORDER = 4.6, 60
+#: Samples of which an order spectrum is made.
+SPECTRUM_SAMPLES = 8000
 #: Share of a channel's residual that a line of an order spectrum must hold to be listed.
 LEAST_LINE = 0.02
 
@@ -95,7 +98,7 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
         found.lines += lines
         best = 0.0
         channel_draws = []
-        for name, columns, corners in _designs(bench, own, lines):
+        for name, columns, corners in _designs(bench, own, lines, residuals):
             share = residual.share(columns, rows)
             curve = None
             if corners is not None:
@@ -115,8 +118,25 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
     return found
 
 
-def coordinates(bench: Bench, series: Series) -> dict[str, Array]:
-    """The coordinates of one series at all its samples, shape (n,) each."""
+def _model_torque(bench: Bench, series: Series, residuals: Sequence[Array]) -> Array | None:
+    """Torque at the output as the model has it: the measured one would hold the residual itself."""
+    for other, residual in zip(bench.series, residuals, strict=True):
+        if other.record == series.record and other.channel == "output_torque":
+            return np.asarray(other.measured - residual)
+    predictor = bench.predictors[series.record]
+    if predictor.plan.load != "scenario":
+        return _smooth(predictor.record.filled(predictor.plan.load))
+    return None
+
+
+def coordinates(bench: Bench, series: Series, residuals: Sequence[Array]) -> dict[str, Array]:
+    """The coordinates of one series at all its samples, shape (n,) each.
+
+    Args:
+        bench: the measured series.
+        series: the one that is asked for.
+        residuals: of all series; they say what torque the model has.
+    """
     predictor = bench.predictors[series.record]
     record = predictor.record
     velocity = predictor.motor_velocity
@@ -129,13 +149,9 @@ def coordinates(bench: Bench, series: Series) -> dict[str, Array]:
         "time_since_reversal": direction * np.log1p(since / 0.02),
         "output_angle": predictor.motor_angle / predictor.ratio,
     }
-    for channel in ("output_torque", "load_torque"):
-        if channel in record.channels and record.trusted[channel].sum() > 20:
-            found["torque"] = _smooth(record.filled(channel))
-            break
-    else:
-        if "motor_torque" in record.channels:
-            found["torque"] = _smooth(record.filled("motor_torque")) * predictor.ratio
+    torque = _model_torque(bench, series, residuals)
+    if torque is not None:
+        found["torque"] = torque
     if "temperature" in record.channels and record.trusted["temperature"].sum() > 20:
         found["temperature"] = record.filled("temperature")
     return found
@@ -170,27 +186,51 @@ def order_lines(bench: Bench, residuals: list[Array], channel: str, most: int = 
     step = max(0.4 / turns, DENSE_ORDER / 600)
     orders = np.arange(max(0.5, 1.5 / turns), min(DENSE_ORDER, highest), step)
     orders = np.unique(np.concatenate([orders, np.arange(1.0, int(highest) + 1)]))
-    thin = max(1, len(theta) // 20000)
-    theta, e = theta[::thin], e[::thin]
-    amplitudes = np.array([2.0 * np.mean(e * np.exp(-1j * n * theta)) for n in orders])
-    shares = 0.5 * np.abs(amplitudes) ** 2 / power
+    # A random part of the samples: taking every k-th would alias the high orders.
+    if len(theta) > SPECTRUM_SAMPLES:
+        part = np.sort(np.random.default_rng(0).choice(len(theta), SPECTRUM_SAMPLES, replace=False))
+        theta, e = theta[part], e[part]
+    waves = np.exp(-1j * np.outer(orders, theta))
     lines: list[Line] = []
-    floor = max(LEAST_LINE, 10.0 * float(np.median(shares)))
-    for k in np.argsort(-shares):
-        if shares[k] < floor or len(lines) >= most:
+    rest = e
+    while len(lines) < most:
+        shares = 2.0 * np.abs(waves @ rest / len(rest)) ** 2 / power
+        k = int(np.argmax(shares))
+        if shares[k] < max(LEAST_LINE, 10.0 * float(np.median(shares))):
             break
-        order = float(orders[k])
+        order = _refined(theta, rest, float(orders[k]), step)
         whole = round(order)
-        if whole >= 1 and abs(order - whole) <= max(step, 0.5 / turns) and abs(order - whole) > 0:
+        if whole >= 1 and abs(order - whole) <= 0.5 / turns:
             order = float(whole)
-        if all(abs(order - line.order) > max(2.0 / turns, 2 * step) for line in lines):
-            lines.append(Line(channel, order, float(np.abs(amplitudes[k])), float(shares[k])))
-    return lines
+        if any(abs(order - line.order) < 1.0 / turns for line in lines):
+            break
+        lines.append(Line(channel, order, 2.0 * abs(np.mean(rest * np.exp(-1j * order * theta))), shares[k]))
+        # The next one is looked for in what all lines so far leave, so that no side lobe is taken for a line.
+        angles = np.outer(theta, [line.order for line in lines])
+        columns = np.hstack([np.sin(angles), np.cos(angles)])
+        fitted, *_ = np.linalg.lstsq(columns, e, rcond=None)
+        rest = e - columns @ fitted
+        half = len(lines)
+        sizes = np.hypot(fitted[:half], fitted[half:])
+        lines = [
+            Line(channel, line.order, float(size), float(0.5 * size**2 / power))
+            for line, size in zip(lines, sizes, strict=True)
+        ]
+    return sorted(lines, key=lambda line: -line.share)
 
 
-def _designs(bench: Bench, own: list[int], lines: list[Line]) -> list[tuple[str, Array, Array | None]]:
+def _refined(theta: Array, e: Array, order: float, step: float) -> float:
+    """The order within one step of ``order`` whose line is strongest."""
+    fine = order + step * np.linspace(-1.0, 1.0, 21)
+    power = [abs(np.mean(e * np.exp(-1j * n * theta))) for n in fine]
+    return float(fine[int(np.argmax(power))])
+
+
+def _designs(
+    bench: Bench, own: list[int], lines: list[Line], residuals: Sequence[Array]
+) -> list[tuple[str, Array, Array | None]]:
     """Name, columns (rows, k) and corners of a curve for every coordinate of one channel."""
-    everything = {k: coordinates(bench, bench.series[k]) for k in own}
+    everything = {k: coordinates(bench, bench.series[k], residuals) for k in own}
     names = list(dict.fromkeys(name for found in everything.values() for name in found))
     result: list[tuple[str, Array, Array | None]] = []
     for name in names:

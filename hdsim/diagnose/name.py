@@ -116,7 +116,9 @@ def screen(
             if any(channel not in bench.channels for channel in fitting.needs):
                 continue
             if behind_sensor(bench, state, name, fitting):
-                found.skipped[name] = "acts on the load's side of the torque sensor, whose reading is the load"
+                found.skipped[name] = (
+                    "acts on the load's side of the torque sensor, whose reading is the load"
+                )
                 continue
             for added in starts(name, fitting, lines):
                 columns = traces(bench, state, predictions, added)

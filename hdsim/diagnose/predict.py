@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hdsim.diagnose.measured import Array, Record
-from hdsim.diagnose.spline import signal, smoothed
+from hdsim.diagnose.spline import TAIL_S, signal, smoothed
 from hdsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ class Predictor:
         period = self.record.period_s
         run = Run(
             model,
-            duration_s=LEAD_IN_S + self.record.duration_s + 2 * period,
+            duration_s=LEAD_IN_S + self.record.duration_s + min(2 * period, TAIL_S),
             sample_rate_hz=1.0 / period,
             rtol=self.rtol,
         )

@@ -12,6 +12,8 @@ from hdsim.errors import InputError
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
 
+#: Time after the record for which its last piece goes on, s.
+TAIL_S = 0.02
 #: Samples between knots that are tried.
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0)
 
@@ -80,7 +82,9 @@ def signal(breaks: Array, coefficients: Array, lead_in_s: float = 0.0) -> Signal
         rows = [(float(first - slope * lead_in_s), float(slope), 0.0, 0.0), *rows]
     width = breaks[-1] - breaks[-2]
     c = coefficients[:, -1]
-    end = float(breaks[-1] - breaks[0] + lead_in_s)
+    # The last piece goes on beyond the record, so that its last samples still see the motion and not a stop.
+    width += TAIL_S
+    end = float(breaks[-1] - breaks[0] + lead_in_s) + TAIL_S
     final = float(c[0] + width * (c[1] + width * (c[2] + width * c[3])))
     segment = Segment(law.CUBIC, times, rows)
     return SignalData(Move((segment, hold(end, final)), end, rows[0][0], final))

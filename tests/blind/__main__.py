@@ -25,7 +25,10 @@ def main() -> None:
         said = outcome(trial)
         rows.append((trial, said.text, judge(trial, said), time.perf_counter() - started))
         mark = "right" if rows[-1][2] else "WRONG"
-        print(f"{trial.group:10} {trial.case.truth:50} seed {trial.case.seed}: {mark} {said.text} ({rows[-1][3]:.0f} s)", flush=True)
+        print(
+            f"{trial.group:10} {trial.case.truth:50} seed {trial.case.seed}: {mark} {said.text} ({rows[-1][3]:.0f} s)",
+            flush=True,
+        )
     text = matrix(rows)
     print(text)
     if "--write" in sys.argv:
@@ -39,12 +42,16 @@ def matrix(rows: list[tuple[Trial, str, bool, float]]) -> str:
         found[trial.group, trial.case.truth][said] += 1
     lines = ["| group | hidden | said |", "|---|---|---|"]
     for (group, truth), said in found.items():
-        lines.append(f"| {group} | {truth} | {'; '.join(f'{text} ({n})' for text, n in said.most_common())} |")
+        lines.append(
+            f"| {group} | {truth} | {'; '.join(f'{text} ({n})' for text, n in said.most_common())} |"
+        )
     lines += ["", "| group | cases | right | s a case |", "|---|---|---|---|"]
     for group in dict.fromkeys(trial.group for trial, *_ in rows):
         own = [(right, seconds) for trial, _, right, seconds in rows if trial.group == group]
         share = sum(right for right, _ in own) / len(own)
-        lines.append(f"| {group} | {len(own)} | {100 * share:.0f} % | {sum(s for _, s in own) / len(own):.0f} |")
+        lines.append(
+            f"| {group} | {len(own)} | {100 * share:.0f} % | {sum(s for _, s in own) / len(own):.0f} |"
+        )
     return "\n".join(lines) + "\n"
 
 

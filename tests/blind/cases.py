@@ -76,10 +76,14 @@ def trials(seeds: int) -> Iterator[Trial]:
         for strength, multiple in STRENGTHS.items():
             for name in EFFECTS:
                 yield Trial(strength, Case(name, sized(name, multiple), seed=seed), (accepted(name),))
-        yield Trial("clear", Case("input_coulomb_viscous", seed=seed), (accepted("input_coulomb_viscous"),), True)
+        yield Trial(
+            "clear", Case("input_coulomb_viscous", seed=seed), (accepted("input_coulomb_viscous"),), True
+        )
         for first, second in PAIRS:
             both = sized(first, 4.0) | sized(second, 4.0)
-            yield Trial("pair", Case(f"{first} + {second}", both, seed=seed), (accepted(first), accepted(second)))
+            yield Trial(
+                "pair", Case(f"{first} + {second}", both, seed=seed), (accepted(first), accepted(second))
+            )
         for name, changes in OUTSIDE.items():
             yield Trial("outside", Case(name, changes, seed=seed))
 
@@ -108,7 +112,9 @@ def _trace(changes: dict[str, float]) -> float:
     """Root-mean-square change of a channel over its noise, the largest over the channels."""
     sensors = Sensors()
     with_it, without = (truth(Case("", c)) for c in (changes, {}))
-    ideal = [np.column_stack([log[:, 1], log[:, 2] - log[:, 0] / -100.0, log[:, 3]]) for log in (with_it, without)]
+    ideal = [
+        np.column_stack([log[:, 1], log[:, 2] - log[:, 0] / -100.0, log[:, 3]]) for log in (with_it, without)
+    ]
     change = ideal[0] - ideal[1]
     if "delay" in changes:
         change[:, 1] += changes["delay"] * np.gradient(without[:, 2], 1e-3)

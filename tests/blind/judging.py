@@ -34,7 +34,9 @@ def run(trial: Trial) -> Diagnosis:
     scenario = hdsim.load_scenario(BASE)
     if trial.friction_free_base:
         friction = scenario.drive.friction.model_copy(update={"coulomb_nm": 0.0, "viscous_nm_s_per_rad": 0.0})
-        scenario = scenario.model_copy(update={"drive": scenario.drive.model_copy(update={"friction": friction})})
+        scenario = scenario.model_copy(
+            update={"drive": scenario.drive.model_copy(update={"friction": friction})}
+        )
     return diagnose([Record("blind", time, channels)], scenario)
 
 

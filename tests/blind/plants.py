@@ -180,7 +180,9 @@ def reference(seconds: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
     f1, f2 = 0.11 * rng.uniform(0.9, 1.1), 0.53 * rng.uniform(0.9, 1.1)
     a1, a2 = 0.9, 0.12
     angle = a1 * np.sin(2 * np.pi * f1 * t) + a2 * (1 - np.cos(2 * np.pi * f2 * t))
-    speed = a1 * 2 * np.pi * f1 * np.cos(2 * np.pi * f1 * t) + a2 * 2 * np.pi * f2 * np.sin(2 * np.pi * f2 * t)
+    speed = a1 * 2 * np.pi * f1 * np.cos(2 * np.pi * f1 * t) + a2 * 2 * np.pi * f2 * np.sin(
+        2 * np.pi * f2 * t
+    )
     return angle, speed
 
 

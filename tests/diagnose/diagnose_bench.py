@@ -1,0 +1,66 @@
+"""Records with known content for the tests of the diagnosis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import hdsim
+from hdsim.diagnose.measured import Record
+from hdsim.scenario.model import Scenario
+
+RATE = 500.0
+
+BASE = """
+name: bench
+drive:
+  rated_torque_nm: 52
+  geometry: {flexspline_teeth: 200, circular_spline_teeth: 202}
+  torsion: {stiffness_k1_nm_per_rad: 1.6e4, stiffness_k2_nm_per_rad: 2.5e4, stiffness_k3_nm_per_rad: 2.9e4,
+            torque_t1_nm: 7, torque_t2_nm: 25, damping_nm_s_per_rad: 8.0}
+  inertia: {motor_kg_m2: 5.0e-5, wave_generator_kg_m2: 1.93e-5}
+  friction: {coulomb_nm: 0.03, viscous_nm_s_per_rad: 3.5e-4}
+  mesh: {model: MESH}
+command:
+  motor: {type: free}
+load: {inertia_kg_m2: 0.5}
+run: {duration_s: 1.0}
+"""
+
+
+def scenario(tmp_path, mesh: str = "rigid", **changes) -> Scenario:
+    """The bench's model, its drive's sections changed."""
+    path = tmp_path / f"{mesh}.yaml"
+    path.write_text(BASE.replace("MESH", mesh), encoding="utf-8")
+    loaded = hdsim.load_scenario(path)
+    for section, values in changes.items():
+        part = getattr(loaded.drive, section).model_copy(update=values)
+        loaded = loaded.model_copy(update={"drive": loaded.drive.model_copy(update={section: part})})
+    return loaded
+
+
+def motion(seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Time, motor angle, velocity and acceleration of a swing that is exactly differentiable."""
+    t = np.arange(round(seconds * RATE)) / RATE
+    parts = ((60.0, 2 * np.pi * 0.3), (8.0, 2 * np.pi * 1.1))
+    angle = sum(a * (1 - np.cos(w * t)) for a, w in parts)
+    velocity = sum(a * w * np.sin(w * t) for a, w in parts)
+    acceleration = sum(a * w * w * np.cos(w * t) for a, w in parts)
+    return t, np.asarray(angle), np.asarray(velocity), np.asarray(acceleration)
+
+
+def rigid_record(
+    seconds: float = 8.0,
+    *,
+    inertia: float = 6.93e-5 + 0.50002 / 1e4,
+    coulomb: float = 0.03,
+    viscous: float = 3.5e-4,
+    extra=lambda angle, velocity: 0.0,
+    noise: float = 2e-3,
+    seed: int = 0,
+) -> Record:
+    """What Newton's law gives for the rigid drive: motor torque of the swing, friction and something hidden."""
+    t, angle, velocity, acceleration = motion(seconds)
+    rng = np.random.default_rng(seed)
+    torque = inertia * acceleration + coulomb * np.tanh(velocity / 0.5) + viscous * velocity
+    torque = torque + extra(angle, velocity) + noise * rng.standard_normal(len(t))
+    return Record("bench", t, {"motor_angle": angle, "motor_torque": torque})

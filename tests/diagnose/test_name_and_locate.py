@@ -1,0 +1,99 @@
+import json
+
+import numpy as np
+import pytest
+from diagnose_bench import rigid_record, scenario
+
+import hdsim
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.locate import order_lines
+from hdsim.diagnose.measured import Record
+from hdsim.diagnose.predict import predictors
+from hdsim.diagnose.verdict import Verdict
+from hdsim.diagnose.workflow import diagnose, save
+from hdsim.errors import InputError
+
+
+def test_orders_2_and_2_02_are_told_apart_by_a_record_that_is_long_enough(tmp_path):
+    t = np.arange(20000) / 500.0
+    angle = 2 * np.pi * 2.5 * t + 8 * np.sin(0.5 * t)  # 100 turns
+    rng = np.random.default_rng(0)
+    torque = 0.01 * np.sin(2 * angle) + 0.006 * np.sin(2.02 * angle + 1) + 0.002 * rng.standard_normal(len(t))
+    bench = Bench(predictors([Record("r", t, {"motor_angle": angle, "motor_torque": torque})], -100.0))
+    lines = order_lines(bench, [torque], "motor_torque")
+    assert [line.order for line in lines[:2]] == pytest.approx([2.0, 2.02], abs=0.004)
+    assert lines[0].amplitude == pytest.approx(0.01, rel=0.25)
+
+
+def stribeck(angle, velocity):
+    """Hess and Soom's curve, not the catalogue's Gaussian."""
+    return 0.05 * velocity / np.sqrt(velocity**2 + 0.1) / (1 + (velocity / 6) ** 2)
+
+
+def ripple(angle, velocity):
+    return 0.006 * np.sin(5 * angle + 0.4)
+
+
+def position_bump(angle, velocity):
+    """Outside the catalogue: a catch at one position of the motor, wherever it is in its turn."""
+    return 0.03 * np.exp(-(((angle - 70) / 6) ** 2))
+
+
+def test_nothing_is_said_of_data_that_the_model_explains(tmp_path):
+    found = diagnose([rigid_record(seed=4)], scenario(tmp_path)).verdict
+    assert found.verdict == "nothing"
+    assert found.effects == []
+    assert found.gap["motor_torque"].after == pytest.approx(2e-3, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "name"), [(stribeck, "stribeck_friction"), (ripple, "motor_torque_ripple")]
+)
+def test_a_hidden_effect_is_named_added_and_closes_the_gap(tmp_path, hidden, name):
+    base = scenario(tmp_path)
+    found = diagnose([rigid_record(extra=hidden, seed=2)], base)
+    verdict = found.verdict
+    assert verdict.verdict == "effect"
+    assert name in [verdict.effects[0].name, *verdict.effects[0].indistinguishable_from]
+    assert len(verdict.effects) == 1
+    gap = verdict.gap["motor_torque"]
+    assert gap.refit > 1.4 * gap.noise
+    closed = (gap.refit**2 - gap.after**2) / (gap.refit**2 - gap.noise**2)
+    assert closed > 0.9
+
+    report = save(found, tmp_path / "rigid.yaml", tmp_path / "out")
+    assert report.read_text(encoding="utf-8").count("data:image/png;base64") == 3
+    written = Verdict.model_validate(json.loads((tmp_path / "out" / "verdict.json").read_text()))
+    assert written.version == 1
+    again = hdsim.load_scenario(written.scenario)
+    assert name in again.effects.active()
+    # The scenario that was written leaves nothing of the same record to name.
+    second = diagnose([rigid_record(extra=hidden, seed=2)], again).verdict
+    assert second.effects == []
+    assert second.gap["motor_torque"].before < 1.1 * gap.after
+
+
+def test_what_the_catalogue_does_not_hold_is_unknown(tmp_path):
+    found = diagnose([rigid_record(12.0, extra=position_bump, seed=1)], scenario(tmp_path)).verdict
+    assert found.verdict == "unknown"
+    assert found.effects == []
+    assert found.located[0].coordinate in ("output_angle", "time")
+
+
+def test_missing_friction_is_named_where_the_base_has_none(tmp_path):
+    base = scenario(tmp_path, friction={"coulomb_nm": 0.0, "viscous_nm_s_per_rad": 0.0})
+    verdict = diagnose([rigid_record(seed=3)], base).verdict
+    assert verdict.effects[0].name == "input_coulomb_viscous"
+    numbers = verdict.effects[0].parameters
+    for field, truth in (("coulomb_nm", 0.03), ("viscous_nm_s_per_rad", 3.5e-4)):
+        low, high = numbers[field].interval
+        assert low <= truth <= high
+        assert high - low < 0.3 * truth
+
+
+def test_suspect_data_stop_a_diagnosis_with_the_reason(tmp_path):
+    record = rigid_record()
+    degrees = record.channels["motor_angle"] / -100.0 * 180 / np.pi
+    bad = Record("r", record.time, {**record.channels, "output_angle": degrees})
+    with pytest.raises(InputError, match="57.3 times motor_angle / -100: one of them is in degrees"):
+        diagnose([bad], scenario(tmp_path, "lumped"))

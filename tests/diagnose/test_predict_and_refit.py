@@ -1,0 +1,119 @@
+import math
+
+import numpy as np
+import pytest
+from diagnose_bench import motion, rigid_record, scenario
+
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.freedom import Added, state_of
+from hdsim.diagnose.measured import Record
+from hdsim.diagnose.predict import Predictor, plan_for, predictors
+from hdsim.diagnose.refit import refit
+from hdsim.diagnose.spline import smoothed
+from hdsim.effects import catalogue
+from hdsim.errors import InputError
+
+
+def test_smoothing_follows_the_motion_and_not_the_noise():
+    t, angle, velocity, acceleration = motion(6.0)
+    noisy = angle + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    breaks, c = smoothed(t, noisy)
+    at = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, len(breaks) - 2)
+    dt = t - breaks[at]
+    inside = slice(100, -100)
+    found = c[0, at] + dt * (c[1, at] + dt * (c[2, at] + dt * c[3, at]))
+    assert np.std((found - angle)[inside]) < 4e-4
+    rate = c[1, at] + dt * (2 * c[2, at] + dt * 3 * c[3, at])
+    assert np.std((rate - velocity)[inside]) < 1e-3 * velocity.std()
+    second = 2 * c[2, at] + 6 * dt * c[3, at]
+    assert np.std((second - acceleration)[inside]) < 0.02 * acceleration.std()
+
+
+def test_prescribed_motion_predicts_newtons_torque(tmp_path):
+    record = rigid_record(4.0, noise=0.0)
+    (predictor,) = predictors([record], -100.0)
+    predicted = predictor.predict(state_of(scenario(tmp_path)).candidate())["motor_torque"]
+    assert np.std(predicted - record.channels["motor_torque"]) < 2e-5
+
+
+def test_the_output_seen_through_the_ratio_stands_for_a_missing_motor_encoder(tmp_path):
+    record = rigid_record(4.0, noise=0.0)
+    other = Record("o", record.time, {
+        "output_angle": record.channels["motor_angle"] / -100.0,
+        "motor_torque": record.channels["motor_torque"],
+    })  # fmt: skip
+    (predictor,) = predictors([other], -100.0)
+    assert predictor.plan.motion == "output_angle"
+    predicted = predictor.predict(state_of(scenario(tmp_path)).candidate())["motor_torque"]
+    assert np.std(predicted - record.channels["motor_torque"]) < 2e-5
+
+
+def test_a_record_that_answers_nothing_is_refused_with_what_is_missing():
+    t = np.arange(500) / 500.0
+    with pytest.raises(InputError, match="a motion is needed"):
+        plan_for(Record("r", t, {"motor_torque": np.sin(t)}))
+    with pytest.raises(InputError, match="motor_torque, output_torque or"):
+        plan_for(Record("r", t, {"motor_angle": np.sin(t)}))
+    with pytest.raises(InputError, match="nothing can be predicted"):
+        plan_for(Record("r", t, {"motor_angle": np.sin(t), "motor_torque": np.ones(500)}))
+
+
+def test_a_wrong_inertia_and_friction_are_found_with_honest_intervals(tmp_path):
+    record = rigid_record(8.0, inertia=1.3 * (6.93e-5 + 0.50002 / 1e4), coulomb=0.04)
+    bench = Bench(predictors([record], -100.0))
+    found = refit(bench, state_of(scenario(tmp_path)))
+    by_name = {i.name: i for i in found.intervals}
+    coulomb = by_name["drive.friction.coulomb_nm"]
+    viscous = by_name["drive.friction.viscous_nm_s_per_rad"]
+    gain = found.fit.state.gain
+    # Nothing but the sensor ties torques to an absolute scale: products with its gain are what is measured.
+    assert gain * coulomb.value == pytest.approx(0.04, rel=0.02)
+    assert gain * viscous.value == pytest.approx(3.5e-4, rel=0.02)
+    state = found.fit.state
+    total = state.drive.inertia.motor_kg_m2 + 1.93e-5 + (state.load.inertia_kg_m2 + 2e-5) / 1e4
+    assert gain * total == pytest.approx(1.3 * (6.93e-5 + 0.50002 / 1e4), rel=0.01)
+    assert found.moved
+    # Two inertias that only add up cannot both be determined by the motor's torque.
+    assert not all(i.determined for i in found.intervals)
+
+
+def test_what_the_data_do_not_determine_stays_and_is_named(tmp_path):
+    t = np.arange(3000) / 500.0
+    angle = 20.0 * t
+    rng = np.random.default_rng(0)
+    torque = 0.03 + 3.5e-4 * 20.0 + 2e-3 * rng.standard_normal(len(t))
+    bench = Bench(predictors([Record("r", t, {"motor_angle": angle, "motor_torque": torque})], -100.0))
+    found = refit(bench, state_of(scenario(tmp_path)))
+    assert not any(i.determined for i in found.intervals)
+    for interval in found.intervals:
+        assert interval.value == interval.start
+        assert math.isnan(interval.low)
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_every_effect_can_be_built_from_its_fittings(name):
+    kind = catalogue()[name]
+    assert kind.fittings
+    for fitting in kind.fittings:
+        from hdsim.diagnose.freedom import signed
+
+        orders = (2.0, 12.0)
+        count = len(signed(fitting, len(orders)))
+        shapes = tuple(shape.starts[0] for shape in fitting.shapes)
+        settings = Added(name, fitting, (1.0,) * count, shapes, orders).settings()
+        kind(**settings)
+
+
+def test_lead_in_lets_the_models_own_oscillation_die_away(tmp_path):
+    record = rigid_record(3.0, noise=0.0)
+    record.channels["output_angle"] = record.channels["motor_angle"] / -100.0
+    record.__post_init__()
+    predictor = Predictor(record, plan_for(record), -100.0)
+    predicted = predictor.predict(state_of(scenario(tmp_path, "lumped")).candidate())
+    error = predicted["output_angle"] - record.channels["motor_angle"] / -100.0
+    # Far below resonance the output lags by J a / K1.
+    wind_up = -0.50002 * motion(3.0)[3] / -100.0 / 1.6e4
+    late = record.time > 1.0
+    assert np.std((error - wind_up)[late]) < 0.05 * np.std(wind_up[late])
+    # The swing begins with a step of acceleration, which at most doubles the wind-up.
+    assert np.max(np.abs(error)) < 2.1 * np.max(np.abs(wind_up))
