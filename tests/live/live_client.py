@@ -52,6 +52,10 @@ class Client:
                     self.send({"op": "subscribe", "subscriptions": wanted})
                 case "parameterValues":
                     self.parameters |= {p["name"]: p.get("value") for p in message["parameters"]}
+                case "status" if message["message"].startswith("Unknown channel ID"):
+                    # The SDK offers a new channel a moment before it takes subscriptions to it.
+                    id = int(message["message"].rsplit(" ", 1)[1])
+                    self.send({"op": "subscribe", "subscriptions": [{"id": id, "channelId": id}]})
                 case "status":
                     self.status.append(message["message"])
             return
