@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hdsim.console import console
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -33,14 +35,12 @@ def _per_row(column: ColumnSpec) -> str:
 @click.option("--columns/--no-columns", default=True, help="List the columns of each table.")
 def info(log: Path, columns: bool) -> None:
     """Show what is in LOG: run, topics, tables with units, attachments."""
-    from rich.console import Console
-
     from hdsim.log.info import info_log
     from hdsim.log.naming import TABLE_RECORD
 
     about = info_log(log)
-    console = Console()
-    console.print(
+    terminal = console()
+    terminal.print(
         f"{log}: {about.size / 1e6:.3g} MB, {sum(about.messages.values())} messages in "
         f"{about.chunks} chunks, {about.start:g} s to {about.start + about.duration:g} s, "
         f"written by {about.library}",
@@ -50,13 +50,13 @@ def info(log: Path, columns: bool) -> None:
     topics = _table("Topics", "topic", "type", "messages", right=("messages",))
     for topic, count in about.messages.items():
         topics.add_row(topic, about.message_types[topic], str(count))
-    console.print(topics)
+    terminal.print(topics)
     if columns:
         for name, specs in about.tables.items():
             table = _table(f"Table {name}", "column", "unit", "a row", "description", right=("a row",))
             for spec in specs:
                 table.add_row(spec.name, spec.unit, _per_row(spec), spec.description)
-            console.print(table)
+            terminal.print(table)
     metadata = _table("Metadata", "record", "name", "text")
     for record, values in about.metadata.items():
         if not record.startswith(TABLE_RECORD):
@@ -64,11 +64,11 @@ def info(log: Path, columns: bool) -> None:
                 first, *rest = value.splitlines() or [""]
                 text = f"{first} ... ({len(rest) + 1} lines)" if rest else first
                 metadata.add_row(record, key, text)
-    console.print(metadata)
+    terminal.print(metadata)
     attachments = _table("Attachments", "name", "bytes", right=("bytes",))
     for name, size in about.attachments.items():
         attachments.add_row(name, str(size))
-    console.print(attachments)
+    terminal.print(attachments)
 
 
 @click.command()
@@ -86,21 +86,19 @@ def export(log: Path, out: Path, table: str) -> None:
 @_LOG
 def verify(log: Path) -> None:
     """Check every CRC, index, schema and message of LOG; exit code 1 if anything is wrong."""
-    from rich.console import Console
-
     from hdsim.log.check import verify_log
 
     report = verify_log(log)
-    console = Console()
+    terminal = console()
     topics = _table(str(log), "topic", "type", "messages", right=("messages",))
     for topic in report.topics.values():
         topics.add_row(topic.topic, topic.message_type, str(topic.messages))
-    console.print(topics)
+    terminal.print(topics)
     for problem in report.problems:
-        console.print(f"problem: {problem}", style="red", highlight=False, markup=False)
+        terminal.print(f"problem: {problem}", style="red", highlight=False, markup=False)
     if not report.ok:
         raise click.exceptions.Exit(1)
-    console.print(
+    terminal.print(
         f"sound: {report.messages} messages in {report.chunks} chunks, "
         f"{len(report.attachments)} attachments, {len(report.metadata)} metadata records",
         highlight=False,
@@ -115,21 +113,19 @@ def recover(log: Path, out: Path | None) -> None:
 
     Without OUT, run.mcap.partial becomes run.mcap if there is none yet, and else run-recovered.mcap.
     """
-    from rich.console import Console
-
     from hdsim.log.recovery import recover_log
 
     if out is None:
         whole = log.with_suffix("") if log.suffix == ".partial" else log
         out = whole if whole != log and not whole.exists() else whole.with_stem(whole.stem + "-recovered")
     report = recover_log(log, out)
-    console = Console()
+    terminal = console()
     topics = _table(f"{out}: {report.chunks} whole chunks", "topic", "messages", right=("messages",))
     for topic, count in report.messages.items():
         topics.add_row(topic, str(count))
-    console.print(topics)
+    terminal.print(topics)
     for lost in report.lost:
-        console.print(f"lost: {lost}", style="yellow", highlight=False, markup=False)
+        terminal.print(f"lost: {lost}", style="yellow", highlight=False, markup=False)
 
 
 @click.command()

@@ -37,7 +37,10 @@ TONE = (
     "follow "
     "from the equations, the equation that does stands beside it; where the paper leaves a choice open, "
     "the choice "
-    "made here is named, so that it can be contradicted in turn. Nothing was tuned to meet a printed number."
+    "made here is named, so that it can be contradicted in turn. Two values were "
+    "chosen to meet the print and are named where they are used: the sampling length of Table 4, and the "
+    "hardness "
+    "at which the stiffness is the printed one."
 )
 
 #: The main findings, for the summary: a row, the verdict that they need, and a sentence over its values.

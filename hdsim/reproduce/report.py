@@ -57,7 +57,7 @@ def print_rows(rows: list[Row], console: Console | None = None) -> None:
                 block.stylize("dim" if name else "", 0, len(first))
                 shown.print(block, soft_wrap=True)
         shown.print()
-    shown.print(f"{TITLE}: {summary(rows)}", markup=False, highlight=False)
+    shown.print(f"{TITLE}: {summary(rows)}", markup=False, highlight=False, soft_wrap=True)
 
 
 def to_json(rows: list[Row]) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from hdsim.console import console
 from hdsim.scenario.problems import Problem, ScenarioError
 
 
@@ -56,7 +57,6 @@ def schema(output: Path | None) -> None:
 @click.command(short_help="List the physical effects that a scenario can turn on.")
 def effects() -> None:
     """List the physical effects that a scenario can turn on, with their sources and the orders they show."""
-    from rich.console import Console
     from rich.table import Table
 
     from hdsim.effects import catalogue
@@ -65,8 +65,5 @@ def effects() -> None:
     for name, effect in catalogue().items():
         orders = ", ".join(f"{order:g}" for order in effect.signature.orders)
         table.add_row(name, effect.title, effect.source, orders)
-    console = Console()
-    if not console.is_terminal:
-        # A pipe has no width; wrapping at 80 columns would break names.
-        console = Console(width=200)
-    console.print(table)
+    terminal = console()
+    terminal.print(table)

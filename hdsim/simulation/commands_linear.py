@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hdsim.console import console
+
 if TYPE_CHECKING:
     import control
 
@@ -87,7 +89,6 @@ def about(point: OperatingPoint) -> str:
 
 def tell(system: control.StateSpace, found: list[Mode], point: OperatingPoint, name: str) -> None:
     """Print operating point and modes."""
-    from rich.console import Console
     from rich.table import Table
 
     table = Table("mode", "Hz", "damping ratio", "pole (1/s)", "state that takes part most", "share")
@@ -105,16 +106,13 @@ def tell(system: control.StateSpace, found: list[Mode], point: OperatingPoint, n
             "" if mode.pole == 0 and integrators > 1 else mode.state,
             "" if mode.pole == 0 and integrators > 1 else f"{mode.participation:.2f}",
         )
-    console = Console()
-    if not console.is_terminal:
-        # A pipe has no width; wrapping would break names.
-        console = Console(width=160)
-    console.print(f"{name}: {about(point)}", highlight=False, markup=False)
-    console.print(f"inputs {', '.join(system.input_labels)}", highlight=False, markup=False)
-    console.print(f"outputs {', '.join(system.output_labels)}", highlight=False, markup=False)
-    console.print(table)
+    terminal = console()
+    terminal.print(f"{name}: {about(point)}", highlight=False, markup=False)
+    terminal.print(f"inputs {', '.join(system.input_labels)}", highlight=False, markup=False)
+    terminal.print(f"outputs {', '.join(system.output_labels)}", highlight=False, markup=False)
+    terminal.print(table)
     if not any(mode.oscillates for mode in found):
-        console.print(
+        terminal.print(
             "nothing oscillates: without load the output may float in the backlash (--load-torque-nm)"
         )
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import click
 
+from hdsim.console import console
+
 _workers = click.option(
     "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes on this machine."
 )
@@ -100,7 +102,6 @@ def _reasons(reasons: list[str]) -> list[tuple[str, int]]:
 
 
 def _tell_summary(summaries: list[Any], confidence: float) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from hdsim.study.engine.plots import words
@@ -114,10 +115,8 @@ def _tell_summary(summaries: list[Any], confidence: float) -> None:
             f"{s.mean.low:.5g} .. {s.mean.high:.5g}" if s.runs > 1 else "", f"{s.median:.5g}",
             f"{s.low:.5g} .. {s.high.value:.5g}" if s.runs > 1 else "", s.unit,
         )  # fmt: skip
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=160)
-    console.print(shown)
+    terminal = console()
+    terminal.print(shown)
     if len(summaries) > 40:
         click.echo(f"... and {len(summaries) - 40} more in summary.csv")
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from hdsim.console import console
+
 
 @click.command(short_help="Find D and G of a measured flank.")
 @click.argument("file", type=click.Path(path_type=Path))
@@ -97,7 +99,6 @@ def _print(found: object, source: str, shape: tuple[int, ...], spacing_m: float)
     """The identification as a table, warnings after it."""
     from typing import cast
 
-    from rich.console import Console
     from rich.table import Table
 
     from hdsim.surface.identify import Identification
@@ -118,7 +119,7 @@ def _print(found: object, source: str, shape: tuple[int, ...], spacing_m: float)
         table.add_row(
             "noise", f"{result.noise_rms_m * 1e9:.1f} nm rms", f"{100 * result.noise_share:.0f} % of S"
         )
-    console = Console()
-    console.print(table)
+    terminal = console()
+    terminal.print(table)
     for warning in result.warnings:
-        console.print(f"warning: {warning}", style="yellow", markup=False)
+        terminal.print(f"warning: {warning}", style="yellow", markup=False)

@@ -340,6 +340,12 @@ def _warnings(
     half = 0.5 * (found.D_interval[1] - found.D_interval[0])
     if half > 0.05:
         told.append(f"the interval of D is wide, +-{half:.2f}: more or longer profiles are needed")
+    if not found.D_interval[0] <= found.D <= found.D_interval[1]:
+        middle = 0.5 * (found.D_interval[0] + found.D_interval[1])
+        told.append(
+            f"bias: a fit over these lags of profiles this long is off by {found.D - middle:+.4f} in D, more than "
+            f"its spread; the interval is free of it, its middle is {middle:.4f}"
+        )
     if lags[0] < lateral:
         told.append(
             f"lags from {lags[0]:.2g} m lie below the lateral resolution of {lateral:.2g} m: the spot "

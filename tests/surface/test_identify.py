@@ -222,3 +222,15 @@ def test_the_command(tmp_path):
     assert "fractal dimension D" in table.output
     wrong = CliRunner().invoke(surface, [*arguments, "--noise", "loud"])
     assert isinstance(wrong.exception, InputError)
+
+
+def test_an_estimate_outside_its_own_interval_is_explained():
+    z = synthetic_profiles(Flank(2.5351, 1.55e-10), 64, 1024, 1e-6, 9)
+    found = identify(z, 1e-6)
+    low, high = found.D_interval
+    outside = not low <= found.D <= high
+    assert outside
+    assert any(w.startswith("bias") for w in found.warnings)
+    one = identify(z[0], 1e-6)
+    assert one.D_interval[0] <= one.D <= one.D_interval[1]
+    assert not any(w.startswith("bias") for w in one.warnings)
