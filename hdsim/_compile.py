@@ -48,7 +48,8 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 def compiled_address(function: Callable[..., None], signature: Any) -> Any:
     """Compile a kernel to a C function; the result's ``address`` is valid as long as the result lives."""
-    callback = CFunc(function, (signature.args, signature.return_type), locals={}, options={"error_model": "numpy"})
+    types = (signature.args, signature.return_type)
+    callback = CFunc(function, types, locals={}, options={"error_model": "numpy"})
     callback.enable_caching()
     _watch_all_files(callback)
     callback.compile()
