@@ -102,7 +102,7 @@ def simulate_to_log(
     with LogWriter(
         path,
         metadata=metadata,
-        attachments={"scenario.yaml": scenario.to_yaml()},
+        attachments={"scenario.yaml": metadata["scenario"]},
         view_rate_hz=view_rate(scenario.run.duration_s),
         compression=scenario.log.compression,
         watch=None if live is None else live.watch,
