@@ -103,7 +103,7 @@ def press(
     try:
         tamaas: Any = import_module("tamaas")
     except ImportError:
-        raise InputError("boundary elements need the package tamaas (pip install 'hdsim[surface]')") from None
+        raise InputError("boundary elements need the package tamaas (pip install 'hdsim[bem]')") from None
     tamaas.set_log_level(tamaas.LogLevel.error)
     z = np.ascontiguousarray(heights_m - heights_m.mean())
     model = tamaas.ModelFactory.createModel(tamaas.model_type.basic_2d, [side_m, side_m], list(z.shape))
