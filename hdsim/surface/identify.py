@@ -343,8 +343,8 @@ def _warnings(
     if not found.D_interval[0] <= found.D <= found.D_interval[1]:
         middle = 0.5 * (found.D_interval[0] + found.D_interval[1])
         told.append(
-            f"bias: a fit over these lags of profiles this long is off by {found.D - middle:+.4f} in D, more than "
-            f"its spread; the interval is free of it, its middle is {middle:.4f}"
+            f"bias: a fit over these lags of profiles this long is off by {found.D - middle:+.4f} in D, more "
+            f"than its spread; the interval is free of it, its middle is {middle:.4f}"
         )
     if lags[0] < lateral:
         told.append(
