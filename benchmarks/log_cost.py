@@ -3,8 +3,8 @@
     python benchmarks/log_cost.py [SCENARIO] [SECONDS]
 
 The scenario runs for SECONDS (60) at 1 kHz, teeth at 50 Hz, with the scene: once into memory, once straight
-into its log; then the recording in memory is written as a log, whose time is all logging and scatters less than
-the difference of two runs. Aims: below 60 MB and below 15 % of the run's processor time.
+into its log; then the recording in memory is written as a log, whose time is all logging and scatters less
+than the difference of two runs. Aims: below 60 MB and below 15 % of processor time.
 """
 
 from __future__ import annotations
