@@ -17,6 +17,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios, for editors."),
     "effects": ("hdsim.scenario.commands:effects", "List the physical effects that a scenario can turn on."),
     "presets": ("hdsim.study.commands:presets", "List the drives that are ready to use."),
+    "catalogue": ("hdsim.study.commands:catalogue", "Simulate a preset's catalogue lines; print the errors."),
     "bench": ("hdsim.study.commands:bench", "Measure a drive as a test bench does, beside its catalogue."),
     "study": ("hdsim.study.commands_engine:study", "Run a study: parameters, replicates, metrics."),
     "budget": ("hdsim.study.commands_engine:budget", "Split a positioning error into its causes."),
