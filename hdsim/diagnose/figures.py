@@ -72,8 +72,9 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
     if not shown:
         return None
     with rc_context(style.STYLE):
-        figure = Figure(figsize=(11.0, 3.1 * ((len(shown) + 1) // 2)), layout="constrained")
-        grid = figure.subplots((len(shown) + 1) // 2, 2, squeeze=False).ravel()
+        rows, wide = (len(shown) + 1) // 2, min(len(shown), 2)
+        figure = Figure(figsize=(5.5 * wide, 3.1 * rows), layout="constrained")
+        grid = figure.subplots(rows, wide, squeeze=False).ravel()
         for axes in grid[len(shown) :]:
             axes.set_axis_off()
         for axes, place in zip(grid, shown, strict=False):
@@ -90,13 +91,13 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
             else:
                 x = coordinates(bench, series, residuals)[place.coordinate]
                 thin = max(1, len(x) // POINTS)
-                rows = np.flatnonzero(series.train)[::thin]
-                axes.plot(x[rows], values[rows], ".", markersize=1.5, color=style.GREY, alpha=0.5)
-                edges = np.unique(np.quantile(x[rows], np.linspace(0, 1, 31)))
+                used = np.flatnonzero(series.train)[::thin]
+                axes.plot(x[used], values[used], ".", markersize=1.5, color=style.GREY, alpha=0.5)
+                edges = np.unique(np.quantile(x[used], np.linspace(0, 1, 31)))
                 if len(edges) > 3:
-                    inside = np.clip(np.searchsorted(edges, x[rows]) - 1, 0, len(edges) - 2)
+                    inside = np.clip(np.searchsorted(edges, x[used]) - 1, 0, len(edges) - 2)
                     count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
-                    mean = np.bincount(inside, values[rows], len(edges) - 1) / count
+                    mean = np.bincount(inside, values[used], len(edges) - 1) / count
                     axes.plot(0.5 * (edges[1:] + edges[:-1]), mean, color=style.ORANGE, linewidth=1.8)
                 axes.set_xlabel(_LABELS.get(place.coordinate, place.coordinate))
                 axes.set_ylabel("measured less model")

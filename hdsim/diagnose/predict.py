@@ -134,6 +134,9 @@ class Predictor:
         breaks, coefficients = smoothed(record.time, values)
         if plan.motion == "output_angle":
             coefficients = coefficients * ratio
+        if plan.locked:
+            # The encoder's zero means nothing there: the drive is unwound where it carries no torque.
+            coefficients[0] -= unloaded_angle(record)
         self.motion = signal(breaks, coefficients, LEAD_IN_S)
         self.load_torque: SignalData | None = None
         if plan.load != "scenario":
@@ -194,6 +197,18 @@ class Predictor:
             # Not compared, but it tells an effect that acts behind the sensor, where none can be seen.
             found["output_torque"] = _interpolated(got.time, got["output_torque"], at)
         return found
+
+
+def unloaded_angle(record: Record) -> float:
+    """Motor angle of a locked drive midway between its branches at zero torque, rad (0 without a torque)."""
+    for channel in ("motor_torque", "output_torque"):
+        if channel in record.channels and record.trusted[channel].sum() > 20:
+            torque, angle = record.filled(channel), record.filled("motor_angle")
+            small = np.abs(torque) < 0.05 * np.max(np.abs(torque))
+            if small.any():
+                low, high = np.quantile(angle[small], [0.05, 0.95])
+                return float(0.5 * (low + high))
+    return 0.0
 
 
 class PredictionError(ArithmeticError):

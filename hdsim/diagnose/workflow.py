@@ -288,6 +288,7 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
         out: directory; made when it is not there.
     """
     from hdsim.diagnose.add import scenario_text
+    from hdsim.diagnose.record_out import side_by_side
     from hdsim.diagnose.report import write_report
 
     out = Path(out)
@@ -300,5 +301,6 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
         )
         path.write_text(text, encoding="utf-8")
         diagnosis.verdict.scenario = str(path)
+    side_by_side(diagnosis).save(out / "compared.mcap")
     (out / "verdict.json").write_text(diagnosis.verdict.model_dump_json(indent=2), encoding="utf-8")
     return write_report(diagnosis, out)
