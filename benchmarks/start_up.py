@@ -2,7 +2,7 @@
 
     python benchmarks/start_up.py
 
-Prints the best of several runs of each, in processor seconds of the whole process, and the ratio to bare Python.
+Prints the best of several runs, in processor seconds of the whole process, and the ratio to bare Python.
 """
 
 from __future__ import annotations
