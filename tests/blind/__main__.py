@@ -26,7 +26,8 @@ def main() -> None:
         rows.append((trial, said.text, judge(trial, said), time.perf_counter() - started))
         mark = "right" if rows[-1][2] else "WRONG"
         print(
-            f"{trial.group:10} {trial.case.truth:50} seed {trial.case.seed}: {mark} {said.text} ({rows[-1][3]:.0f} s)",
+            f"{trial.group:10} {trial.case.truth:50} seed {trial.case.seed}: {mark} {said.text} "
+            f"({rows[-1][3]:.0f} s)",
             flush=True,
         )
     text = matrix(rows)

@@ -22,7 +22,9 @@ EFFECTS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "lugre_friction": (
         {"lugre_static": 0.06, "lugre_stiffness": 6.0, "lugre_speed": 5.0}, ("lugre_static",),
     ),
-    "motor_torque_ripple": ({"ripple_order": 12.0, "ripple_torque": 0.01, "ripple_phase": 0.6}, ("ripple_torque",)),
+    "motor_torque_ripple": (
+        {"ripple_order": 12.0, "ripple_torque": 0.01, "ripple_phase": 0.6}, ("ripple_torque",),
+    ),
     "load_side_friction": ({"load_coulomb": 1.0, "load_viscous": 0.8}, ("load_coulomb", "load_viscous")),
     "torsional_hysteresis": ({"maxwell_torque": 1.0, "maxwell_scale": 6e-4}, ("maxwell_torque",)),
     "output_backlash": ({"gap": 2e-5}, ("gap",)),
@@ -97,7 +99,7 @@ _UNITS: dict[str, float] = {}
 
 
 def sized(name: str, multiple: float) -> dict[str, float]:
-    """The plant's numbers at which the effect's trace is ``multiple`` times the noise where it is strongest."""
+    """The plant's numbers that make the effect's largest trace ``multiple`` times its channel's noise."""
     changes, scaling = EFFECTS[name]
     if name not in _UNITS:
         _UNITS[name] = _trace(changes)

@@ -18,13 +18,53 @@ STEP = 5e-5  # s, of the integrator
 RATE = 1000  # Hz, of the log
 
 # Indices of the plant's numbers.
-NAMES = (
-    "motor_inertia load_inertia k1 k2 k3 t1 t2 damping coulomb viscous load_loss arm gain "
-    "ke_order ke_amplitude ke_phase ke_order2 ke_amplitude2 stribeck_extra stribeck_speed lugre_static "
-    "lugre_stiffness lugre_speed maxwell_torque maxwell_scale ripple_order ripple_torque ripple_phase "
-    "load_coulomb load_viscous gap cubic wg_once unbalance unbalance_phase encoder_once encoder_phase "
-    "delay sensor_order sensor_ripple cable spring_kick thermal_rate drift output_locked"
-).split()
+NAMES = [
+    "motor_inertia",
+    "load_inertia",
+    "k1",
+    "k2",
+    "k3",
+    "t1",
+    "t2",
+    "damping",
+    "coulomb",
+    "viscous",
+    "load_loss",
+    "arm",
+    "gain",
+    "ke_order",
+    "ke_amplitude",
+    "ke_phase",
+    "ke_order2",
+    "ke_amplitude2",
+    "stribeck_extra",
+    "stribeck_speed",
+    "lugre_static",
+    "lugre_stiffness",
+    "lugre_speed",
+    "maxwell_torque",
+    "maxwell_scale",
+    "ripple_order",
+    "ripple_torque",
+    "ripple_phase",
+    "load_coulomb",
+    "load_viscous",
+    "gap",
+    "cubic",
+    "wg_once",
+    "unbalance",
+    "unbalance_phase",
+    "encoder_once",
+    "encoder_phase",
+    "delay",
+    "sensor_order",
+    "sensor_ripple",
+    "cable",
+    "spring_kick",
+    "thermal_rate",
+    "drift",
+    "output_locked",
+]
 AT = {name: k for k, name in enumerate(NAMES)}
 (
     MOTOR_INERTIA, LOAD_INERTIA, K1, K2, K3, T1, T2, DAMPING, COULOMB, VISCOUS, LOAD_LOSS, ARM, GAIN,
@@ -130,7 +170,7 @@ def integrate(reference, speed, p, log):
     y[3] = speed[0]
     y[2] = reference[0]
     integral = 0.0
-    steps = int(round(1.0 / (RATE * STEP)))
+    steps = round(1.0 / (RATE * STEP))
     for k in range(n):
         wanted = RATIO * speed[k] + 25.0 * (RATIO * reference[k] - y[0])
         error = wanted - y[1]
@@ -174,7 +214,7 @@ class Case:
 
 
 def reference(seconds: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Angle and speed at the output: swings of a slow and a fast sine with a pause, all directions and speeds."""
+    """Angle and speed at the output: a slow and a fast swing, both directions, all speeds."""
     rng = np.random.default_rng([seed, 11])
     t = np.arange(round(seconds * RATE)) / RATE
     f1, f2 = 0.11 * rng.uniform(0.9, 1.1), 0.53 * rng.uniform(0.9, 1.1)

@@ -58,7 +58,7 @@ def rigid_record(
     noise: float = 2e-3,
     seed: int = 0,
 ) -> Record:
-    """What Newton's law gives for the rigid drive: motor torque of the swing, friction and something hidden."""
+    """What Newton's law gives for the rigid drive: torque of the swing, friction, something hidden."""
     t, angle, velocity, acceleration = motion(seconds)
     rng = np.random.default_rng(seed)
     torque = inertia * acceleration + coulomb * np.tanh(velocity / 0.5) + viscous * velocity

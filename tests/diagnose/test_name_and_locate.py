@@ -95,5 +95,5 @@ def test_suspect_data_stop_a_diagnosis_with_the_reason(tmp_path):
     record = rigid_record()
     degrees = record.channels["motor_angle"] / -100.0 * 180 / np.pi
     bad = Record("r", record.time, {**record.channels, "output_angle": degrees})
-    with pytest.raises(InputError, match="57.3 times motor_angle / -100: one of them is in degrees"):
+    with pytest.raises(InputError, match=r"57\.3 times motor_angle / -100: one of them is in degrees"):
         diagnose([bad], scenario(tmp_path, "lumped"))

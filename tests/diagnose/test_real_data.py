@@ -26,8 +26,8 @@ load: {inertia_kg_m2: 1.0e-4}
 run: {duration_s: 1.0}
 """
 
-#: Coulomb friction (N m) of a straight-line fit of motor torque less sensor torque over the sign of the velocity
-#: and the velocity, referred to the output.
+#: Coulomb friction (N m at the output) of a straight-line fit of motor torque less sensor torque over the
+#: velocity and its sign.
 FRICTION = {1: 2.66, 3: 2.17, 4: 2.44, 6: 1.18}
 
 
