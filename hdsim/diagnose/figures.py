@@ -9,9 +9,11 @@ import numpy as np
 from hdsim.plot import style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from hdsim.diagnose.locate import Place
+    from hdsim.diagnose.measured import Array
     from hdsim.diagnose.verdict import Verdict
     from hdsim.diagnose.workflow import Diagnosis
 
@@ -89,22 +91,40 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
                 axes.set_ylabel("amplitude")
                 axes.set_ylim(bottom=0)
             else:
-                x = coordinates(bench, series, residuals)[place.coordinate]
+                where = coordinates(bench, series, residuals)
+                x = where[place.coordinate]
                 thin = max(1, len(x) // POINTS)
                 used = np.flatnonzero(series.train)[::thin]
                 axes.plot(x[used], values[used], ".", markersize=1.5, color=style.GREY, alpha=0.5)
-                edges = np.unique(np.quantile(x[used], np.linspace(0, 1, 31)))
-                if len(edges) > 3:
-                    inside = np.clip(np.searchsorted(edges, x[used]) - 1, 0, len(edges) - 2)
-                    count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
-                    mean = np.bincount(inside, values[used], len(edges) - 1) / count
-                    axes.plot(0.5 * (edges[1:] + edges[:-1]), mean, color=style.ORANGE, linewidth=1.8)
+                turned = where["direction"][used]
+                halves = (turned > 0, turned < 0) if place.coordinate in _LOOPS else (turned == turned,)
+                for half, colour, label in zip(
+                    halves, (style.ORANGE, style.BLUE), ("motor forwards", "motor backwards"), strict=False
+                ):
+                    _mean_curve(axes, x[used][half], values[used][half], colour, label)
+                if len(halves) == 2:
+                    axes.legend(loc="best")
                 axes.set_xlabel(_LABELS.get(place.coordinate, place.coordinate))
                 axes.set_ylabel("measured less model")
             axes.set_title(
                 f"{place.channel}: {100 * place.share:.0f} % over {place.coordinate}".replace("_", " ")
             )
     return figure
+
+
+#: Coordinates over which the two directions of motion may differ.
+_LOOPS = ("torque", "output_angle", "temperature")
+
+
+def _mean_curve(axes: Axes, x: Array, values: Array, colour: str, label: str) -> None:
+    """Draw the mean of ``values`` over bins of ``x`` that hold equally many samples."""
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, 31))) if len(x) > 60 else np.zeros(0)
+    if len(edges) < 4:
+        return
+    inside = np.clip(np.searchsorted(edges, x) - 1, 0, len(edges) - 2)
+    count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
+    mean = np.bincount(inside, values, len(edges) - 1) / count
+    axes.plot(0.5 * (edges[1:] + edges[:-1]), mean, color=colour, linewidth=1.8, label=label)
 
 
 _LABELS = {
