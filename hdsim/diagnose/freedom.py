@@ -89,10 +89,6 @@ class Added:
                 put(data, term.section, items)
         return data
 
-    def lower(self) -> list[float]:
-        """Least value of each coefficient."""
-        return [-math.inf if free else 0.0 for free in signed(self.fitting, len(self.orders))]
-
 
 def signed(fitting: Fitting, orders: int) -> list[bool]:
     """Whether each coefficient of a fitting may be negative."""
