@@ -7,7 +7,7 @@ STAMP  := $(VENV)/installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-fast check setup lock schema picture clean
+.PHONY: help run test test-fast check setup lock schema picture blind clean
 
 help:
 	@echo "make run        simulate the seed drive; the log and the picture go to logs/"
@@ -16,6 +16,7 @@ help:
 	@echo "make setup      only install what is needed into $(VENV)"
 	@echo "make lock       resolve the development set anew (needs uv)"
 	@echo "make schema     write scenarios/scenario.schema.json anew"
+	@echo "make blind      hide effects in data and see what the diagnosis makes of them (minutes)"
 	@echo "make picture    draw docs/images/seed_move.png anew"
 	@echo "make clean      remove $(VENV), caches and logs"
 
@@ -49,6 +50,9 @@ lock:
 
 schema: $(STAMP)
 	$(BIN)/hdsim schema -o scenarios/scenario.schema.json
+
+blind: $(STAMP)
+	$(BIN)/python tests/blind 1
 
 picture: run
 	cp logs/seed_move.png docs/images/seed_move.png
