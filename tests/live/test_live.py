@@ -257,7 +257,11 @@ def test_commands_serve_and_end_on_interrupt(tmp_path):
     assert "live     ws://127.0.0.1:" in done.stdout
     assert "verified yes" in done.stdout
     process = subprocess.Popen(
-        [*common, "replay", str(log), "--live", "--port", "0"], stdout=subprocess.PIPE, text=True
+        [*common, "replay", str(log), "--live", "--port", "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+        # Jobs in the background are born deaf to Ctrl-C, and so would be their children.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert process.stdout is not None
     line = process.stdout.readline()
