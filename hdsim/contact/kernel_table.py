@@ -99,15 +99,8 @@ def tabulate(
     grid = step * np.arange(nodes)
     force, slope = law.force(grid), law.stiffness(grid)
     slope[0] = law.initial_stiffness_n_per_m
-    rise = np.diff(force)
-    c = np.empty((nodes - 1, 5))
-    c[:, 0], c[:, 1] = force[:-1], slope[:-1]
-    c[:, 2] = (3.0 * rise / step - 2.0 * slope[:-1] - slope[1:]) / step
-    c[:, 3] = (slope[:-1] + slope[1:] - 2.0 * rise / step) / step**2
-    cell_energy = step * (c[:, 0] + step * (c[:, 1] / 2.0 + step * (c[:, 2] / 3.0 + step * c[:, 3] / 4.0)))
-    energy = np.concatenate([[0.0], np.cumsum(cell_energy)])
-    c[:, 4] = energy[:-1]
-    ends = float(force[-1]), float(slope[-1]), float(energy[-1])
+    c, end_energy = quartic_cells(step, force, slope)
+    ends = float(force[-1]), float(slope[-1]), end_energy
     table = ContactTable(step, c, *ends, math.nan, math.nan)
     if not measure_error:
         return table
@@ -121,6 +114,28 @@ def tabulate(
         _relative(table.force(inside), exact_force),
         _relative(table.energy(inside), exact_energy),
     )
+
+
+def quartic_cells(step: float, force: Array, stiffness: Array) -> tuple[Array, float]:
+    """Cubic Hermite cells of a force whose integral is the energy, so that energy and force agree exactly.
+
+    Args:
+        step: width of a cell.
+        force: values at the nodes, shape (n + 1,).
+        stiffness: slopes at the nodes, shape (n + 1,).
+
+    Returns:
+        The coefficients c of ``ContactTable``, shape (n, 5), and the energy at the last node.
+    """
+    rise = np.diff(force)
+    c = np.empty((len(rise), 5))
+    c[:, 0], c[:, 1] = force[:-1], stiffness[:-1]
+    c[:, 2] = (3.0 * rise / step - 2.0 * stiffness[:-1] - stiffness[1:]) / step
+    c[:, 3] = (stiffness[:-1] + stiffness[1:] - 2.0 * rise / step) / step**2
+    work = step * (c[:, 0] + step * (c[:, 1] / 2.0 + step * (c[:, 2] / 3.0 + step * c[:, 3] / 4.0)))
+    energy = np.concatenate([[0.0], np.cumsum(work)])
+    c[:, 4] = energy[:-1]
+    return c, float(energy[-1])
 
 
 def _relative(found: Array, exact: Array) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hdsim.contact.kernel_table import quartic_cells
 from hdsim.errors import PhysicsError
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def spring_cells(
         scale: |g| of the arrangement: twist at the ring is scale times, torque 1/scale times the output's.
 
     Returns:
-        Cell width (rad) and coefficients of shape (CELLS, 5), see ``hdsim.contact.table``.
+        Cell width (rad) and coefficients of shape (CELLS, 5), see ``hdsim.contact.kernel_table``.
 
     Raises:
         PhysicsError: the total wind-up does not increase with torque.
@@ -117,23 +118,4 @@ def spring_cells(
     step = float(twist[-1]) / CELLS
     nodes = step * np.arange(CELLS + 1)
     nodes[-1] = twist[-1]
-    return step, quartic_cells(step, curve(nodes), curve.derivative()(nodes))
-
-
-def quartic_cells(step: float, force: Array, stiffness: Array) -> Array:
-    """Cubic Hermite cells of the force whose integral is the energy, so that energy and force agree exactly.
-
-    Args:
-        step: width of a cell.
-        force: values at the nodes, shape (n + 1,).
-        stiffness: slopes at the nodes, shape (n + 1,).
-
-    Returns:
-        Shape (n, 5): F = c0 + c1 s + c2 s^2 + c3 s^3, U = c4 + c0 s + c1 s^2/2 + c2 s^3/3 + c3 s^4/4.
-    """
-    f0, f1, k0, k1 = force[:-1], force[1:], stiffness[:-1], stiffness[1:]
-    c2 = (3 * (f1 - f0) / step - 2 * k0 - k1) / step
-    c3 = (2 * (f0 - f1) / step + k0 + k1) / step**2
-    work = step * (f0 + step * (k0 / 2 + step * (c2 / 3 + step * c3 / 4)))
-    energy = np.concatenate([[0.0], np.cumsum(work)[:-1]])
-    return np.stack([f0, k0, c2, c3, energy], axis=1)
+    return step, quartic_cells(step, curve(nodes), curve.derivative()(nodes))[0]

@@ -151,7 +151,9 @@ class Run:
         self.block = BLOCK
         self.failure: str | None = None
         self.interrupted: BaseException | None = None
+        # True channels as far back as the sensors look: for the controller, and for the log.
         self._recent: Table | None = None
+        self._history: Table | None = None
 
     def spans(self) -> Array:
         """Times at which the integration is cut, from 0 to the duration: shape (spans + 1,)."""
@@ -271,7 +273,7 @@ class Run:
         self.audit.add(table)
         tables = {"state": table}
         if self.model.sensors:
-            self._history = _extended(getattr(self, "_history", None), table, times[0] - self.observer.memory)
+            self._history = _extended(self._history, table, times[0] - self.observer.memory)
             table.columns.update(self.observer.sensed(self._history, times))
         if self.teeth_every and self.model.teeth is not None:
             chosen = np.round(times * self.sample_rate_hz).astype(int) % self.teeth_every == 0
