@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
-from hdsim.diagnose.predict import Candidate, PredictionError
+from hdsim.diagnose.predict import LEAD_IN_S, Candidate, PredictionError
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Inverse, Periodic
+from hdsim.effects.table import Table
 
 if TYPE_CHECKING:
     from hdsim.scenario import Scenario
@@ -143,6 +144,10 @@ class State:
                 effects[name] = known[name](**settings)
             except ValidationError as error:
                 raise PredictionError(str(error)) from None
+        for name, effect in effects.items():
+            if isinstance(effect, Table):
+                # A curve over time begins with the record, after the lead-in.
+                effects[name] = effect.delayed(LEAD_IN_S)
         return Candidate(self.drive, effects, self.load, self.seed)
 
 

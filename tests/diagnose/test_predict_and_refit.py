@@ -90,7 +90,7 @@ def test_what_the_data_do_not_determine_stays_and_is_named(tmp_path):
         assert math.isnan(interval.low)
 
 
-@pytest.mark.parametrize("name", list(catalogue()))
+@pytest.mark.parametrize("name", [name for name in catalogue() if name != "table"])
 def test_every_effect_can_be_built_from_its_fittings(name):
     kind = catalogue()[name]
     assert kind.fittings
