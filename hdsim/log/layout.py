@@ -31,7 +31,9 @@ Topics = Mapping[str, Collection[str]]
 
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 _SHORT_S, _LONG_S = 10.0, 60.0
-_LEGEND_LINE_PX = 30
+_LEGEND_MARGIN_PX, _LETTER_PX = 50, 8
+_NOW_STYLE = {"color": "#ff3b30", "lineSize": 2.0}
+_CURVE_STYLE = {"color": "#4e98e2", "lineSize": 0.8}
 _CAMERA_DISTANCE = 5.0
 """Of the camera from the drive, in pitch radii."""
 
@@ -81,28 +83,29 @@ def column(*parts: tuple[float, Panel | Split]) -> Split:
     return Split("column", parts)
 
 
-def plot(title: str, *paths: str, over: str | None = None, dots: bool = False) -> Panel:
+def plot(title: str, *paths: str, over: str | None = None, dots: bool = False, legend: bool = True) -> Panel:
     """Values over time; with ``over``, arrays over another of the message, or over ``index``."""
+    labels = [_label(path, paths) for path in paths]
     lines = [
         {
             "value": path,
             "enabled": True,
             "timestampMethod": "receiveTime",
-            "label": _label(path, paths),
+            "label": label,
             "showLine": not dots,
         }
-        for path in paths
+        for path, label in zip(paths, labels, strict=True)
     ]
     settings: dict[str, Any] = {
         "paths": lines,
         "showLegend": True,
-        "legendDisplay": "top" if len(paths) > 1 else "none",
+        "legendDisplay": "left" if legend and len(paths) > 1 else "none",
         "showPlotValuesInLegend": False,
         "showXAxisLabels": True,
         "showYAxisLabels": True,
         "isSynced": over is None,
         "xAxisVal": "timestamp" if over is None else "index" if over == "index" else "currentCustom",
-        "sidebarDimension": _LEGEND_LINE_PX * len(paths) + 40,
+        "sidebarDimension": _LEGEND_MARGIN_PX + _LETTER_PX * max(map(len, labels)),
     }
     drawn = paths
     if over not in (None, "index"):
@@ -112,12 +115,15 @@ def plot(title: str, *paths: str, over: str | None = None, dots: bool = False) -
 
 
 def _label(path: str, others: tuple[str, ...]) -> str:
-    """What tells a line from the others: its topic where the fields are the same, else its field."""
-    fields = {other.partition(".")[2] for other in others}
+    """What tells a line from the others: its topic, its index or its field, whichever they don't share."""
     topic, _, field = path.partition(".")
+    fields = {other.partition(".")[2] for other in others}
     if len(others) > 1 and len(fields) == 1:
         return topic.removeprefix("/hd/").removesuffix("_view")
-    return field.removesuffix("_arcsec").removesuffix("_um").removesuffix("[:]")
+    name, _, index = field.removesuffix("[:]").partition("[")
+    if index:
+        return f"no. {index.removesuffix(']')}"
+    return name.removesuffix("_arcsec").removesuffix("_um")
 
 
 def scene(title: str = "Drive") -> Panel:
@@ -199,9 +205,17 @@ def _profile() -> Panel:
 
 
 def _loop() -> Panel:
-    return plot(
-        "Torque [N m] over twist [arcsec]", f"{LOOP}.output_torque[:]", over=f"{LOOP}.twist_arcsec[:]"
+    panel = plot(
+        "Torque [N m] over twist [arcsec], red: now",
+        f"{LOOP}.output_torque_now[:]",
+        f"{LOOP}.output_torque[:]",
+        over=f"{LOOP}.twist_arcsec[:]",
+        legend=False,
     )
+    # The viewer draws the first line over the second.
+    for line, style in zip(panel.settings["paths"], (_NOW_STYLE, _CURVE_STYLE), strict=True):
+        line.update(style)
+    return panel
 
 
 def _contact_lamp() -> Panel:
@@ -250,7 +264,7 @@ def tooth_contact() -> Split:
         (
             55,
             column(
-                (30, plot("Three teeth over time [N]", *some)),
+                (30, plot("Force of three teeth over time [N]", *some)),
                 (25, plot("Engaged share", f"{STATE}.engaged_share")),
                 (
                     25,

@@ -136,25 +136,28 @@ class TableStream(Stream):
             found = f"{float(time[late[0]])!r} s follows {float(previous)!r} s"
             raise InputError(f"table {name!r}: time must increase; {found}")
 
-    def append(self, time: Array | None, log_times: NDArray[Any], columns: Sequence[Array]) -> bool:
+    def append(
+        self,
+        time: Array | None,
+        log_times: NDArray[Any],
+        columns: Sequence[Array],
+        *,
+        shown: bool = True,
+    ) -> bool:
         """Add at most ``room`` rows; returns whether that filled a chunk, which is then written.
 
         Args:
             time: (n,), in s; None where the message has no time.
             log_times: (n,), ns.
             columns: arrays (n,) or (n, k).
+            shown: whether who watches the log sees them too.
         """
         n = len(log_times)
         rows = self._rows[self._filled : self._filled + n]
-        rows["sequence"] = np.arange(self._sequence, self._sequence + n) & 0xFFFFFFFF
-        rows["log_time"] = log_times
-        rows["publish_time"] = log_times
-        values = [*columns] if time is None else [time, *columns]
-        for index, column in enumerate(values):
-            rows[f"f{index}"] = column
+        self._fill(rows, time, log_times, columns)
         if time is not None and n:
             self.last_time = float(time[-1])
-        if self._container.watch is not None:
+        if shown and self.watched:
             self._tell(log_times, rows.view(np.uint8).reshape(n, -1), HEAD.size)
         self._sequence += n
         self._filled += n
@@ -162,6 +165,27 @@ class TableStream(Stream):
             return False
         self.flush()
         return True
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody watches the log."""
+        return self._container.watch is not None
+
+    def show(self, time: Array | None, log_times: NDArray[Any], columns: Sequence[Array]) -> None:
+        """Hand rows to who watches the log, and to nobody else; arguments as for `append`."""
+        n = len(log_times)
+        records = np.tile(self._layout.template, (n, 1))
+        self._fill(records.view(self._layout.dtype)[:, 0], time, log_times, columns)
+        self._tell(log_times, records, HEAD.size)
+
+    def _fill(
+        self, rows: NDArray[Any], time: Array | None, log_times: NDArray[Any], columns: Sequence[Array]
+    ) -> None:
+        rows["sequence"] = np.arange(self._sequence, self._sequence + len(rows)) & 0xFFFFFFFF
+        rows["log_time"] = log_times
+        rows["publish_time"] = log_times
+        for index, values in enumerate(columns if time is None else [time, *columns]):
+            rows[f"f{index}"] = values
 
     def flush(self) -> None:
         """Write the rows that wait."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -13,11 +14,12 @@ from hdsim.log.view import MinMaxView
 
 ARCSEC_PER_RAD = 180 * 3600 / np.pi
 LOOP_COLUMNS = ("twist_arcsec", "output_torque")
-LOOP_SAMPLES = 1000
-"""Samples of the view that a loop shows: the last ones before its time."""
+LOOP_NOW = "output_torque_now"
+LOOP_SAMPLES = 2000
+"""Samples of the view in a loop: half of them before its stretch begins, half from there on."""
 
 LOOP_EVERY = 100
-"""Samples of the view from one loop to the next."""
+"""Samples of the view in a stretch: from one loop to the next."""
 
 
 def display_columns(columns: Sequence[ColumnSpec]) -> list[tuple[int, float, ColumnSpec]]:
@@ -104,20 +106,28 @@ class ViewStream:
 class LoopStream:
     """Torque over twist as arrays, one message for every stretch of the view.
 
-    Viewers draw a curve of one quantity over another only from arrays within a message. Each message holds
-    the last samples before its time, older ones first; where the run is younger, NaN.
+    Viewers draw a curve of one quantity over another only from arrays within a message, and show the last
+    message whose time has come. So a message bears the time at which its stretch begins, and holds what lies
+    around: `LOOP_SAMPLES`, at the ends of a run its first or last ones, older ones first, NaN where a run is
+    shorter. It is written when these are known, half its length behind the view. A second array holds the
+    torque of the stretch itself, NaN elsewhere, so that one sees where on the curve the drive is.
+
+    Who watches the run while it is simulated can't see ahead: the watch gets messages of what there is so
+    far, at the time of their last sample, with the latest stretch as the second array.
 
     Args:
-        stream: the topic, with one array for each of `LOOP_COLUMNS`.
+        stream: the topic, with one array for each of `LOOP_COLUMNS` and one for the stretch.
         places: which columns of the view those are.
     """
 
     def __init__(self, stream: TableStream, places: Sequence[int]) -> None:
         self.stream = stream
         self._places = places
-        self._recent = np.full((len(places), LOOP_SAMPLES), np.nan)
-        self._since = LOOP_EVERY - 1  # the first at once, so that a log opens on something
-        self._last: float | None = None
+        self._recent = np.empty((len(places), 0))
+        self._count = 0
+        self._last = 0.0
+        self._begun: deque[tuple[int, float]] = deque()
+        self._shown = 0
 
     @classmethod
     def of(
@@ -128,28 +138,52 @@ class LoopStream:
         if not all(name in by_name for name in LOOP_COLUMNS):
             return None
         chosen = [by_name[name] for name in LOOP_COLUMNS]
-        specs = [ColumnSpec(c.name, c.field, c.unit, c.description, (LOOP_SAMPLES,)) for _, c in chosen]
+        shape = (LOOP_SAMPLES,)
+        specs = [ColumnSpec(c.name, c.field, c.unit, c.description, shape) for _, c in chosen]
+        specs.append(ColumnSpec(LOOP_NOW, LOOP_NOW, specs[-1].unit, "of the stretch that begins now", shape))
         return cls(make(specs), [i for i, _ in chosen])
 
     def feed(self, time: Array, columns: Sequence[Array]) -> None:
         """Take rows of the view."""
         begin = 0
         while begin < len(time):
-            end = min(len(time), begin + LOOP_EVERY - self._since)
+            if self._count % LOOP_EVERY == 0:
+                self._begun.append((self._count, float(time[begin])))
+            end = min(len(time), begin + LOOP_EVERY - self._count % LOOP_EVERY)
             fresh = np.array([columns[i][begin:end] for i in self._places])
-            self._recent = np.concatenate([self._recent[:, end - begin :], fresh], axis=1)
-            self._since += end - begin
+            self._recent = np.concatenate([self._recent, fresh], axis=1)[:, -LOOP_SAMPLES:]
+            self._count += end - begin
             self._last = float(time[end - 1])
-            if self._since == LOOP_EVERY:
-                self._write()
             begin = end
+            while self._begun and self._count >= max(LOOP_SAMPLES, self._begun[0][0] + LOOP_SAMPLES // 2):
+                self._write(*self._begun.popleft())
+            # Soon and often at first, so that who watches needn't look at an empty panel.
+            if self._count - self._shown >= min(max(1, self._shown), LOOP_EVERY):
+                self._show()
 
     def finish(self) -> None:
-        """Write the loop at the end of the run."""
-        if self._last is not None and self._since:
-            self._write()
+        """Write the loops of the last stretches."""
+        while self._begun:
+            self._write(*self._begun.popleft())
+        if self._count > self._shown:
+            self._show()
 
-    def _write(self) -> None:
-        time = np.array([self._last])
-        self.stream.append(time, naming.to_ns(time), list(self._recent[:, None, :]))
-        self._since = 0
+    def _write(self, begin: int, at: float) -> None:
+        time = np.array([at])
+        self.stream.append(time, naming.to_ns(time), self._arrays(begin), shown=False)
+
+    def _show(self) -> None:
+        self._shown = self._count
+        if self.stream.watched:
+            time = np.array([self._last])
+            self.stream.show(time, naming.to_ns(time), self._arrays(self._count - 1 - LOOP_EVERY))
+
+    def _arrays(self, begin: int) -> list[Array]:
+        """What a message holds: the samples at hand, and the torque of those from ``begin`` on."""
+        size = self._recent.shape[1]
+        first = max(0, begin - (self._count - size))
+        stretch = slice(first, min(size, first + LOOP_EVERY + 1))
+        rows = np.full((len(self._places) + 1, 1, LOOP_SAMPLES), np.nan)
+        rows[:-1, 0, :size] = self._recent
+        rows[-1, 0, stretch] = self._recent[-1, stretch]
+        return list(rows)

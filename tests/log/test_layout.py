@@ -138,27 +138,3 @@ def test_the_command_prints_a_layout_for_a_log(diagnosed):
     assert isinstance(error, InputError)
     assert "there are: overview, positioning-error" in str(error)
     assert verify_log(diagnosed).ok
-
-
-def test_loops_hold_the_last_samples_before_their_time(diagnosed):
-    import numpy as np
-    from mcap.reader import make_reader
-
-    from hdsim.log.schemas import message_class
-
-    run = drive_run()
-    with open(diagnosed, "rb") as file:
-        loops = [
-            message_class(schema.name, schema.data).FromString(message.data)
-            for schema, _, message in make_reader(file).iter_messages([layout.LOOP])
-        ]
-    assert len(loops) == 21
-    for loop in (loops[0], loops[5], loops[-1]):
-        end = int(np.searchsorted(run.time, loop.time)) + 1
-        begin = max(0, end - 1000)
-        twist = run["twist"][begin:end] * (180 * 3600 / np.pi)
-        np.testing.assert_array_equal(loop.twist_arcsec[1000 - (end - begin) :], twist)
-        np.testing.assert_array_equal(
-            loop.output_torque[1000 - (end - begin) :], run["output_torque"][begin:end]
-        )
-        assert np.isnan(loop.twist_arcsec[: 1000 - (end - begin)]).all()

@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from mcap.reader import make_reader
 from test_javascript_reader import read, reader  # noqa: F401 - a fixture
 
 import hdsim
 from hdsim.log import read_attachments, verify_log
 from hdsim.log.info import info_log
 from hdsim.log.layout import LAYOUTS, build_layout, playback_speed, split_path
+from hdsim.log.naming import EPOCH_NS
+from hdsim.log.schemas import message_class
 from hdsim.scenario.model import Scenario
 from hdsim.simulation.simulate import simulate_to_log
 
@@ -83,6 +87,37 @@ def strings_of_paths(value):
             yield from strings_of_paths(each)
     elif isinstance(value, str) and value.startswith("/hd/"):
         yield value
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_every_panel_has_something_to_show_in_the_first_instant(log_of, path):
+    """A viewer shows the last message of each topic up to its time."""
+    log = log_of(path)
+    attached = [text for name, text in read_attachments(log).items() if name.startswith("layout-")]
+    paths = {each for text in attached for each in strings_of_paths(json.loads(text)["configById"])}
+    first = {}
+    with open(log, "rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages(sorted(map(topic_of, paths))):
+            if message.log_time > EPOCH_NS:
+                break
+            if schema.name.startswith("hdsim."):
+                first[channel.topic] = message_class(schema.name, schema.data).FromString(message.data)
+            else:
+                first[channel.topic] = message.data
+    assert set(first) == set(map(topic_of, paths))
+    loop = first["/hd/state_loop"]
+    curve = np.array([loop.twist_arcsec, loop.output_torque])
+    points = np.unique(curve[:, np.isfinite(curve).all(axis=0)], axis=1).T
+    # A drive without load keeps to one point.
+    assert len(points) > 10 or not np.ptp(hdsim.open_log(log)["output_torque"])
+    for each in paths:
+        if each.endswith("[:]"):
+            topic, field = split_path(each)
+            assert np.isfinite(getattr(first[topic], field)).sum() >= 2, each
+
+
+def topic_of(path):
+    return split_path(path)[0]
 
 
 @pytest.mark.parametrize("path", SCENARIOS[:3], ids=lambda path: path.stem)

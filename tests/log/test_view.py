@@ -1,13 +1,18 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from hdsim.log import write_log
+from hdsim.log import LogWriter, write_log
+from hdsim.log.naming import EPOCH_NS
+from hdsim.log.schemas import message_class
 from hdsim.log.view import MinMaxView
+from hdsim.log.viewing import LOOP_EVERY, LOOP_SAMPLES
 from hdsim.recording import Column, Recording, Table
 
 
@@ -66,8 +71,6 @@ def test_a_falling_slot_keeps_falling():
 def read_topic(path, topic):
     from mcap.reader import make_reader
 
-    from hdsim.log.schemas import message_class
-
     with open(path, "rb") as file:
         return [
             message_class(schema.name, schema.data).FromString(message.data)
@@ -107,3 +110,90 @@ def test_views_hold_small_angles_and_lengths_in_units_that_fill_an_axis(tmp_path
     assert not hasattr(messages[0], "motor_angle_arcsec")
     (static,) = read_topic(path, "/hd/static_view")
     np.testing.assert_allclose(static.gap_um, [1.0, 2.0])
+
+
+def loop_messages(path):
+    """Log times in s and messages of the state's loop."""
+    from mcap.reader import make_reader
+
+    with open(path, "rb") as file:
+        return [
+            (1e-9 * (m.log_time - EPOCH_NS), message_class(schema.name, schema.data).FromString(m.data))
+            for schema, _, m in make_reader(file).iter_messages(["/hd/state_loop"])
+        ]
+
+
+def twisted(n, rate=1000.0):
+    time = np.arange(n) / rate
+    phase = 2 * np.pi * time / max(time[-1], 1e-3)
+    twist, torque = 1e-3 * np.sin(phase), 50 * np.sin(phase + 0.2)
+    return Table(time, {"twist": Column(twist, "rad"), "output_torque": Column(torque, "N m")})
+
+
+def test_the_first_loop_message_holds_a_curve_already(tmp_path):
+    path = write_log(Recording({"state": twisted(5000)}), tmp_path / "a.mcap")
+    at, first = loop_messages(path)[0]
+    assert at == 0.0
+    drawn = np.isfinite(first.twist_arcsec) & np.isfinite(first.output_torque)
+    assert drawn.sum() >= 1000
+    assert np.ptp(np.array(first.output_torque)[drawn]) > 30
+    assert np.ptp(np.array(first.twist_arcsec)[drawn]) > 100
+
+
+@pytest.mark.parametrize("n", [1, 2, 99, 100, 101, 250, 1999, 2000, 2001, 2101, 5000])
+def test_a_loop_holds_the_run_around_its_moment_and_marks_where_it_is(tmp_path, n):
+    state = twisted(n)
+    path = tmp_path / "a.mcap"
+    with LogWriter(path, metadata={}, view_rate_hz=np.inf) as log:
+        cuts = [0, *sorted(np.random.default_rng(n).integers(0, n, 3)), n]
+        for a, b in pairwise(cuts):
+            rows = {name: Column(c.values[a:b], c.unit) for name, c in state.columns.items()}
+            log.write("state", Table(state.time[a:b], rows))
+    torque = state.columns["output_torque"].values
+    messages = loop_messages(path)
+    assert len(messages) == -(-n // LOOP_EVERY)
+    assert (np.diff([at for at, _ in messages]) > 0).all()
+    for k, (at, message) in enumerate(messages):
+        begin = k * LOOP_EVERY
+        assert at == pytest.approx(state.time[begin], abs=1e-9)
+        whole = np.array(message.output_torque)
+        seen = whole[: min(n, LOOP_SAMPLES)]
+        assert np.isnan(whole[len(seen) :]).all()
+        # One uninterrupted piece of the run, at its ends the first or the last samples.
+        first = min(max(0, begin - LOOP_SAMPLES // 2), max(0, n - LOOP_SAMPLES))
+        np.testing.assert_array_equal(seen, torque[first : first + len(seen)])
+        now = np.array(message.output_torque_now)
+        marked = np.flatnonzero(np.isfinite(now))
+        np.testing.assert_array_equal(marked + first, np.arange(begin, min(n, begin + LOOP_EVERY + 1)))
+        np.testing.assert_array_equal(now[marked], whole[marked])
+
+
+def test_who_watches_a_run_sees_loops_of_what_there_is_and_the_log_of_what_comes(tmp_path):
+    state = twisted(5000)
+    told = []
+
+    def watch(schema, channel, log_times, bodies):
+        if channel.topic == "/hd/state_loop":
+            of = message_class(schema.name, schema.data)
+            told.extend((t, of.FromString(body)) for t, body in zip(log_times, bodies, strict=True))
+
+    path = tmp_path / "a.mcap"
+    with LogWriter(path, metadata={}, view_rate_hz=np.inf, watch=watch) as log:
+        for begin in range(0, 5000, 50):
+            rows = slice(begin, begin + 50)
+            columns = {name: Column(c.values[rows], c.unit) for name, c in state.columns.items()}
+            log.write("state", Table(state.time[rows], columns))
+            # Whoever watches has heard of it as soon as it is computed, and of nothing later.
+            upto = EPOCH_NS + round(1e9 * state.time[rows][-1])
+            assert upto - 100_000_000 < told[-1][0] <= upto
+    assert (np.diff([at for at, _ in told]) > 0).all()
+    torque = state.columns["output_torque"].values
+    for at, message in told:
+        count = round(1e-9 * (at - EPOCH_NS) * 1000) + 1
+        held = np.array(message.output_torque)
+        held = held[np.isfinite(held)]
+        np.testing.assert_array_equal(held, torque[max(0, count - LOOP_SAMPLES) : count])
+    alone = write_log(Recording({"state": state}), tmp_path / "b.mcap")
+    assert [m.SerializeToString() for _, m in loop_messages(path)] == [
+        m.SerializeToString() for _, m in loop_messages(alone)
+    ]
