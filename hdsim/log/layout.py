@@ -31,7 +31,8 @@ Topics = Mapping[str, Collection[str]]
 
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 _SHORT_S, _LONG_S = 10.0, 60.0
-_LEGEND_MARGIN_PX, _LETTER_PX = 50, 8
+_LEGEND_MARGIN_PX, _LETTER_PX = 80, 10
+"""Width of a legend: more than its text takes, because the viewer narrows it in favour of the plot."""
 _NOW_STYLE = {"color": "#ff3b30", "lineSize": 2.0}
 _CURVE_STYLE = {"color": "#4e98e2", "lineSize": 0.8}
 _CAMERA_DISTANCE = 5.0
@@ -85,7 +86,7 @@ def column(*parts: tuple[float, Panel | Split]) -> Split:
 
 def plot(title: str, *paths: str, over: str | None = None, dots: bool = False, legend: bool = True) -> Panel:
     """Values over time; with ``over``, arrays over another of the message, or over ``index``."""
-    labels = [_label(path, paths) for path in paths]
+    labels = _labels(paths)
     lines = [
         {
             "value": path,
@@ -114,16 +115,18 @@ def plot(title: str, *paths: str, over: str | None = None, dots: bool = False, l
     return Panel("Plot", title, settings, drawn)
 
 
-def _label(path: str, others: tuple[str, ...]) -> str:
-    """What tells a line from the others: its topic, its index or its field, whichever they don't share."""
-    topic, _, field = path.partition(".")
-    fields = {other.partition(".")[2] for other in others}
-    if len(others) > 1 and len(fields) == 1:
-        return topic.removeprefix("/hd/").removesuffix("_view")
-    name, _, index = field.removesuffix("[:]").partition("[")
-    if index:
-        return f"no. {index.removesuffix(']')}"
-    return name.removesuffix("_arcsec").removesuffix("_um")
+def _labels(paths: tuple[str, ...]) -> list[str]:
+    """What tells the lines of a plot from each other: topics, indexes, or what their fields don't share."""
+    split = [path.partition(".")[::2] for path in paths]
+    names = [re.sub(r"(_arcsec|_um)?(\[:\])?$", "", field) for _, field in split]
+    if len(paths) > 1 and len(set(names)) == 1:
+        return [topic.removeprefix("/hd/").removesuffix("_view") for topic, _ in split]
+    found = [name.partition("[") for name in names]
+    if all(index for *_, index in found):
+        return [f"no. {index.removesuffix(']')}" for *_, index in found]
+    # The title names the quantity: of motor_torque and load_torque motor and load are left.
+    last = {name.rpartition("_")[2] for name in names}
+    return [name.rpartition("_")[0] if len(paths) > 1 and len(last) == 1 else name for name in names]
 
 
 def scene(title: str = "Drive") -> Panel:
@@ -315,6 +318,10 @@ LAYOUTS: dict[str, Callable[[], Split]] = {
 }
 
 
+NEEDED = {"tooth-contact": TEETH}
+"""Topics without which a layout has nothing of its own to show."""
+
+
 def split_path(path: str) -> tuple[str, str]:
     """Topic and field of a message path: ``/hd/teeth.angle[:]`` is ``/hd/teeth`` and ``angle``."""
     topic, _, rest = path.partition(".")
@@ -342,7 +349,7 @@ def build_layout(
     if topics is not None:
         if STATE not in topics and MEASURED in topics:
             tree = _of_measured(tree)
-        tree = _prune(tree, topics)
+        tree = _prune(tree, topics) if NEEDED.get(name) in (None, *topics) else None
     if tree is None or all(panel.kind == "RosOut" for panel in _panels(tree)):
         raise InputError(f"the log has no topic that layout {name!r} shows")
     return {

@@ -101,7 +101,18 @@ def test_what_a_log_lacks_is_left_out(tmp_path):
     assert "3D!drive" not in built["configById"]
     assert "Indicator!contact" not in built["configById"]
     (error,) = (s for p, s in built["configById"].items() if p == "Plot!error")
-    assert [line["label"] for line in error["paths"]] == ["transmission_error"]
+    assert [line["label"] for line in error["paths"]] == ["transmission"]
+
+
+def test_a_drive_without_teeth_has_no_layout_of_them(tmp_path):
+    run = drive_run()
+    del run.tables["teeth"]
+    path = write_log(run, tmp_path / "a.mcap")
+    assert set(read_attachments(path)) == {
+        "scenario.yaml",
+        "layout-overview.json",
+        "layout-positioning-error.json",
+    }
 
 
 def test_lines_are_told_apart_by_what_differs():
@@ -109,7 +120,10 @@ def test_lines_are_told_apart_by_what_differs():
         return [line["label"] for line in layout.build_layout(name)["configById"][panel]["paths"]]
 
     assert labels("diagnose", "Plot!output_torque") == ["measured", "before", "after"]
-    assert labels("overview", "Plot!error") == ["tracking_error", "transmission_error"]
+    assert labels("overview", "Plot!error") == ["tracking", "transmission"]
+    assert labels("overview", "Plot!motor_torque") == ["motor", "input_friction"]
+    assert labels("tooth-contact", "Plot!force_of_three_teeth_over_time") == ["no. 0", "no. 5", "no. 10"]
+    assert labels("tooth-contact", "Plot!engaged_share") == ["engaged_share"]
 
 
 @pytest.mark.parametrize(
