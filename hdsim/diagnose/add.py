@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from hdsim.diagnose.freedom import Added, Free, State, merge, put
 from hdsim.diagnose.measured import Array
@@ -42,12 +43,23 @@ def scenario_text(base: Path, state: State, freedoms: Sequence[Free], start: Sta
                 put(data, path, _rounded(new))
     effects: dict[str, Any] = {}
     for added in state.added:
-        merge(effects.setdefault(added.effect, {}), _all_rounded(added.settings()))
+        known = effects.setdefault(added.effect, _lists(start, added.effect))
+        merge(known, _all_rounded(added.settings()))
     if abs(state.gain - 1.0) > 1e-9:
         put(effects, "sensors.motor_torque.gain_error", _rounded(state.gain - 1.0))
     if effects:
         merge(data.setdefault("effects", {}), effects)
     return to_yaml(data)
+
+
+def _lists(state: State, name: str) -> dict[str, Any]:
+    """Lists of sections that an effect of the base has: a scenario's list replaces that of its base."""
+    effect = state.effects.get(name)
+    return {
+        field: [item.model_dump(mode="json", exclude_unset=True) for item in value]
+        for field, value in (effect or ())
+        if isinstance(value, tuple) and value and isinstance(value[0], BaseModel)
+    }
 
 
 def _number(state: State, path: str) -> float | None:
