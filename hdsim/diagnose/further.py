@@ -43,12 +43,12 @@ class Candidate(_Part):
     """A scenario that was considered as the next experiment."""
 
     title: str
-    """What it does."""
+    """What is done."""
     separation: float
     """d' between the two candidates that it separates worst: the distance between their records, each fitted
     to the other as well as it can be, in standard deviations of the noise."""
     relative: float
-    """Gain over repeating the measured record: that number over the record's own."""
+    """That number over the one of a repetition of the measured record."""
 
 
 class NextExperiment(_Part):
@@ -60,6 +60,8 @@ class NextExperiment(_Part):
     """The candidates that it separates."""
     separation: float
     """Its expected d' between the two that it separates worst."""
+    repeated: float
+    """The same for a repetition of the measured record."""
     correct: float
     """Expected share of right decisions between those two if the noise were all that is unknown."""
     considered: list[Candidate]
