@@ -164,22 +164,27 @@ class Player(threading.Thread):
             last = now
             if self.viewer is None:
                 continue
-            again = [m for m in self._store.latest(since) if m[1] in stale] if stale and not jumped else []
-            for at, topic, body in [*again, *self._messages(upto, jumped)]:
+            if jumped:
+                # Viewers throw away what they have when time goes back, and the SDK may let messages overtake
+                # the time. So what there is to show comes with the next delivery.
+                self._store.rewind(self._seen, upto)
+                with self._change:
+                    self._stale |= set(self._store.topics)
+                self.viewer.tell(state)
+                continue
+            again = [m for m in self._store.latest(since) if m[1] in stale] if stale else []
+            for at, topic, body in [*again, *self._messages(upto)]:
                 self.viewer.publish(topic, at, body)
             moved = before is None or (state.speed, state.paused, state.ended) != (
                 before.speed,
                 before.paused,
                 before.ended,
             )
-            if jumped or moved or now - told > 0.2 or upto != since:
+            if moved or now - told > 0.2 or upto != since:
                 self.viewer.tell(state)
                 told, before = now, state
 
-    def _messages(self, upto: int, jumped: bool) -> list[tuple[int, str, bytes]]:
-        if jumped:
-            self._store.rewind(self._seen, upto)
-            return self._store.latest(upto)
+    def _messages(self, upto: int) -> list[tuple[int, str, bytes]]:
         found = self._store.following(self._seen, upto)
         last = {topic: k for k, (_, topic, _) in enumerate(found) if topic in _ONLY_LATEST}
         return [m for k, m in enumerate(found) if last.get(m[1], k) == k]

@@ -28,6 +28,9 @@ class Client:
         self.parameters: dict[str, Any] = {}
         self.playback: list[tuple[int, int, float, bool, str]] = []
         self.status: list[str] = []
+        self.clock = 0
+        self.after_seek: set[str] = set()
+        """Topics that have come since time went back."""
 
     def take(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Receive for a while, or until something is so; returns whether it became so."""
@@ -62,6 +65,12 @@ class Client:
         if data[0] == 1:
             id, at = struct.unpack_from("<IQ", data, 1)
             self.messages.setdefault(self.channels[id]["topic"], []).append((at, data[13:]))
+            self.after_seek.add(self.channels[id]["topic"])
+        elif data[0] == 2:
+            before = self.clock
+            (self.clock,) = struct.unpack_from("<Q", data, 1)
+            if self.clock < before:
+                self.after_seek = set()
         elif data[0] == 5:
             state, at, speed, jumped, size = struct.unpack_from("<BQfBI", data, 1)
             self.playback.append((state, at, speed, bool(jumped), data[19 : 19 + size].decode()))
