@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.diagnose.check import noise_floor
 from hdsim.diagnose.measured import Array, Mask
-from hdsim.diagnose.predict import Candidate, Predictor
+from hdsim.diagnose.predict import Candidate, PredictionError, Predictor
 from hdsim.errors import InputError
+
+if TYPE_CHECKING:
+    from hdsim.diagnose.freedom import State
+
+#: Models that are simulated at the same time, in threads: the compiled solver lets go of the interpreter.
+THREADS = min(4, os.cpu_count() or 1)
 
 #: Aimed length of a block, s, and the least and most blocks of a record.
 BLOCK_S = 0.25
@@ -97,6 +105,20 @@ class Bench:
         """The predicted channels, each once."""
         return tuple(dict.fromkeys(series.channel for series in self.series))
 
+    def ranges(self) -> dict[str, float]:
+        """Ranges that the training records cover: ``twist_arcmin`` (1 % quantiles) where they tell it."""
+        widest = 0.0
+        for predictor in self.predictors[: self.training]:
+            twist = predictor.motor_angle / predictor.ratio
+            record = predictor.record
+            if not predictor.plan.locked:
+                if predictor.plan.motion != "motor_angle" or "output_angle" not in record.channels:
+                    continue
+                twist = twist - record.filled("output_angle")
+            low, high = np.quantile(twist, [0.01, 0.99])
+            widest = max(widest, float(np.degrees(high - low)) * 60.0)
+        return {"twist_arcmin": widest} if widest > 0 else {}
+
     def predict(self, candidate: Candidate, gain: float = 1.0, *, everything: bool = False) -> list[Array]:
         """Predictions of all series; of records that are held out only when ``everything``.
 
@@ -115,6 +137,28 @@ class Bench:
             values = found[series.record][series.channel]
             predictions.append(gain * values if series.channel == "motor_torque" else values)
         return predictions
+
+    def predict_all(self, states: Sequence[State]) -> list[list[Array] | None]:
+        """Predictions of the training records for many models, side by side in threads.
+
+        Args:
+            states: the models.
+
+        Returns:
+            One list of series for each, None where the model could not be predicted.
+        """
+        from concurrent.futures import ThreadPoolExecutor
+
+        def one(state: State) -> list[Array] | None:
+            try:
+                return self.predict(state.candidate(), state.gain)
+            except PredictionError:
+                return None
+
+        if len(states) < 2 or THREADS < 2:
+            return [one(state) for state in states]
+        with ThreadPoolExecutor(THREADS) as pool:
+            return list(pool.map(one, states))
 
     def residuals(self, predictions: Sequence[Array]) -> list[Array]:
         """Measured less predicted, less the mean over the samples that a fit may see (a sensor's offset)."""

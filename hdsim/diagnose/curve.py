@@ -1,9 +1,9 @@
 """Step 8 for ``unknown``: the curve over a coordinate that explains best what is left, as a ``table`` effect.
 
 Each corner's unit curve is simulated once in the re-fitted model; its change of all channels is a column.
-The values follow from penalised least squares with a penalty on second differences (Eilers and Marx 1996,
-Statistical Science 11:89), whose weight is the one that predicts left-out blocks of time best, so that noise
-draws no curve. What the model's own numbers or the sensors' offsets explain is left to them.
+The values follow from penalised least squares, whose roughness is the one that predicts left-out blocks of
+time best, so that noise draws no curve. What the model's own numbers or the sensors' offsets explain is left
+to them.
 """
 
 from __future__ import annotations
@@ -11,10 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.fit import COEFFICIENT_PRIOR, Fit, trace
@@ -22,7 +20,8 @@ from hdsim.diagnose.freedom import Added, State, scaled
 from hdsim.diagnose.further import CurveFound
 from hdsim.diagnose.locate import Location, coordinates, hats
 from hdsim.diagnose.measured import Array
-from hdsim.diagnose.screen import FOLDS, TOGETHER, Residual
+from hdsim.diagnose.penalised import UNSEEN, Penalised, penalised, roughness
+from hdsim.diagnose.screen import Residual
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects.table import COORDINATE_UNITS, Acting, Coordinate, TableCurve, cells
 
@@ -34,11 +33,6 @@ MOST_PLACES, NEAR = 3, 0.5
 LEAST_SHARE = 0.05
 #: Share by which a later kind of curve must be better than an earlier, plainer one.
 TIE = 0.01
-#: Weights of the penalty that are tried, as a multiple of the mean information on a value.
-WEIGHTS = tuple(10.0**k for k in range(-5, 4))
-#: Information below this part of the largest counts as none: the model's own numbers explain that direction.
-UNSEEN = 1e-4
-
 _WORDS: dict[Coordinate, str] = {
     "motor_angle": "wave-generator angle",
     "motor_velocity": "motor speed",
@@ -157,7 +151,7 @@ def fit_curve(
     numbers = bench.stacked_series()
     offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
     left = Residual(bench.stacked(residuals), np.hstack([fit.columns, offsets]), bench.stacked_blocks())
-    best: tuple[float, Kind, Array, Added, Array, _Penalised] | None = None
+    best: tuple[float, Kind, Array, Added, Array, Penalised] | None = None
     tried: dict[str, float] = {}
     for kind in kinds(bench, location):
         if on_step is not None:
@@ -169,8 +163,11 @@ def fit_curve(
         columns = unit_traces(bench, fit, kind, at, added, residuals)
         if columns is None:
             continue
-        found = _penalised(
-            left.project(columns), left.values, bench.stacked_blocks(), _roughness(kind, len(at))
+        found = penalised(
+            left.project(columns),
+            left.values,
+            bench.stacked_blocks(),
+            roughness(len(at), closed=kind.period is not None),
         )
         tried[kind.words] = max(tried.get(kind.words, 0.0), found.share)
         if best is None or found.share > best[0] + TIE:
@@ -269,7 +266,7 @@ def corners(
     columns = hats(x[rows], fine)
     if kind.times_direction:
         columns = columns * _signs(bench)[rows][:, None]
-    smooth = _penalised(columns, left.values[rows], blocks[rows], _roughness(kind, FINE))
+    smooth = penalised(columns, left.values[rows], blocks[rows], roughness(FINE))
     bend = np.abs(np.diff(smooth.values, 2))
     density = np.sqrt(np.concatenate([bend[:1], bend, bend[-1:]]))
     density = density + 0.3 * density.mean() + 1e-300
@@ -373,66 +370,8 @@ def _basis(at: Array, period: float | None, x: Array) -> Array:
     return columns
 
 
-def _roughness(kind: Kind, count: int) -> Array:
-    """Penalty matrix: sum of squared second differences of the values, around the turn for a period."""
-    if kind.period is None:
-        d = np.diff(np.eye(count), 2, axis=0)
-    else:
-        d = np.roll(np.eye(count), 1, axis=1) - 2.0 * np.eye(count) + np.roll(np.eye(count), -1, axis=1)
-    return np.asarray(d.T @ d)
-
-
-@dataclass
-class _Penalised:
-    """A penalised fit: values, cross-validated share, the inverse it was solved with and the penalty."""
-
-    values: Array
-    share: float
-    inverse: Array
-    penalty: Array
-
-
-def _penalised(x: Array, y: Array, blocks: NDArray[np.int64], roughness: Array) -> _Penalised:
-    """Least squares with the penalty weight that predicts left-out blocks of time best.
-
-    Args:
-        x: shape (n, k).
-        y: shape (n,).
-        blocks: shape (n,).
-        roughness: shape (k, k).
-    """
-    used, number = np.unique(blocks, return_inverse=True)
-    order = np.argsort(number, kind="stable")
-    edges = np.searchsorted(number[order], np.arange(len(used) + 1))
-    x, y = x[order], y[order]
-    grams = np.stack([x[a:b].T @ x[a:b] for a, b in pairwise(edges)])
-    moments = np.stack([x[a:b].T @ y[a:b] for a, b in pairwise(edges)])
-    total = float(y @ y)
-    fold = (np.arange(len(used)) // TOGETHER) % FOLDS
-    whole, right = grams.sum(axis=0), moments.sum(axis=0)
-    scale = float(np.trace(whole)) / len(whole)
-    best: tuple[float, float] | None = None
-    for weight in WEIGHTS:
-        gained = 0.0
-        for k in range(FOLDS):
-            inner, moment = grams[fold == k].sum(axis=0), moments[fold == k].sum(axis=0)
-            beta = _inverse(whole - inner + weight * scale * roughness) @ (right - moment)
-            gained += float(2.0 * moment @ beta - beta @ inner @ beta)
-        if best is None or gained > best[0]:
-            best = (gained, weight)
-    assert best is not None
-    penalty = best[1] * scale * roughness
-    inverse = _inverse(whole + penalty)
-    return _Penalised(inverse @ right, best[0] / total if total > 0 else 0.0, inverse, penalty)
-
-
-def _inverse(matrix: Array) -> Array:
-    """Inverse without the directions that nothing is known of: there the values stay 0."""
-    return np.asarray(np.linalg.pinv(matrix, rcond=UNSEEN, hermitian=True))
-
-
 def _solved(
-    bench: Bench, fit: Fit, left: Residual, at: Array, added: Added, columns: Array, found: _Penalised
+    bench: Bench, fit: Fit, left: Residual, at: Array, added: Added, columns: Array, found: Penalised
 ) -> tuple[Fit, Array]:
     """The model with the curve, and the standard deviations of its coefficients.
 

@@ -220,8 +220,14 @@ def _outcomes(bench: Bench, tried: Sequence[Experiment], fits: Mapping[str, Fit]
 
 def _steps(fit: Fit) -> list[tuple[State, float]]:
     """Every fitted number moved a little, with the step, in the order of the fit's covariance."""
-    vector = _Vector(fit.state, tuple(fit.frees), max(len(fit.state.added) - 1, 0))
-    x = vector.start()
+    # How many of the effects were held while it was fitted shows in the size of the covariance.
+    for held in range(len(fit.state.added), -1, -1):
+        vector = _Vector(fit.state, tuple(fit.frees), held)
+        x = vector.start()
+        if len(x) == len(fit.covariance):
+            break
+    else:
+        raise ValueError(f"a fit of {len(fit.covariance)} numbers, but its model has {len(x)}")
     found = []
     for k, step in enumerate(vector.steps(x)):
         moved = x.copy()

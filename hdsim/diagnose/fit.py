@@ -197,22 +197,21 @@ def fit(
 
 def sensitivities(bench: Bench, vector: _Vector, x: Array) -> Array:
     """Derivatives of the whitened predictions, offsets removed, shape (rows, p)."""
-    moved = vector.state(x)
-    base = bench.predict(moved.candidate(), moved.gain)
-    columns = []
-    for k, step in enumerate(vector.steps(x)):
+    states = [vector.state(x)]
+    steps = vector.steps(x)
+    for k, step in enumerate(steps):
         shifted = x.copy()
         shifted[k] += step
-        state = vector.state(shifted)
-        try:
-            there = bench.predict(state.candidate(), state.gain)
-        except PredictionError:
-            columns.append(
-                np.zeros(int(sum(s.train.sum() for s in bench.series if s.record < bench.training)))
-            )
-            continue
-        columns.append(trace(bench, base, there) / step)
-    return np.column_stack(columns) if columns else np.zeros((len(bench.stacked_blocks()), 0))
+        states.append(vector.state(shifted))
+    base, *rest = bench.predict_all(states)
+    rows = len(bench.stacked_blocks())
+    if base is None or not rest:
+        return np.zeros((rows, len(rest)))
+    columns = [
+        np.zeros(rows) if there is None else trace(bench, base, there) / step
+        for there, step in zip(rest, steps, strict=True)
+    ]
+    return np.column_stack(columns)
 
 
 def trace(bench: Bench, base: Sequence[Array], there: Sequence[Array]) -> Array:

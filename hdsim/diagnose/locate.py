@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hdsim.diagnose.bench import Bench, Series
 from hdsim.diagnose.measured import Array
-from hdsim.diagnose.screen import Residual, chance_of
+from hdsim.diagnose.screen import Residual
 
 #: Corners of the piecewise linear curves over a coordinate.
 CORNERS = 9
@@ -114,7 +114,8 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
     found.lines.sort(key=lambda line: -line.share)
     if residual.power > 0 and draws:
         found.structured = max(0.0, explained / residual.power)
-        found.chance = chance_of(explained, [np.sum(np.maximum(np.stack(draws), 0.0), axis=0)])
+        by_chance = np.sum(np.maximum(np.stack(draws), 0.0), axis=0)
+        found.chance = float((1 + np.sum(by_chance >= explained)) / (1 + len(by_chance)))
     return found
 
 

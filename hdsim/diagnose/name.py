@@ -8,9 +8,10 @@ blocks that the comparison has not used.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,10 @@ from hdsim.diagnose.fit import Fit, fit, trace
 from hdsim.diagnose.freedom import Added, Free, State, signed
 from hdsim.diagnose.locate import Line
 from hdsim.diagnose.measured import Array
-from hdsim.diagnose.predict import PredictionError
+from hdsim.diagnose.predict import CARRIED, PredictionError
 from hdsim.diagnose.screen import Residual, Share, chance_of
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Fitting, Periodic
+from hdsim.effects._fitting import Amplitude, Fitting, Periodic
 
 #: Orders of a periodic term that are taken from the spectra.
 MOST_ORDERS = 3
@@ -32,17 +33,22 @@ LEVEL = 0.02
 LEAST_SHARE = 0.03
 #: Candidates that are fitted in full, and the part of the best share that they must reach on the screen.
 SHORTLIST, NEAR = 4, 0.75
+#: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
+FAR = 0.7
+#: Part of its share that another effect must keep beside the best to be an effect of its own.
+BESIDE = 0.6
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
 SAME = 0.02
 
 
 @dataclass
 class Screened:
-    """An effect on the screen: the fitting of it that explains most."""
+    """An effect on the screen: the fitting of it that explains most, and its trace, shape (rows, k)."""
 
     name: str
     added: Added
     share: Share
+    columns: Array
 
 
 @dataclass
@@ -70,6 +76,9 @@ class Named:
         losses: shape (blocks,), power of each block's residual after the fit.
         group: effects that these data cannot tell from it, with the ratio of explained power.
         confidence: share of resampled records (over blocks) in which it, or its group, is best.
+        share: of the residual, which its trace explained on the screen.
+        chance: of the search that found it.
+        alternatives: fits of the others on the shortlist.
     """
 
     name: str
@@ -77,6 +86,9 @@ class Named:
     losses: Array
     group: dict[str, float]
     confidence: float
+    share: float
+    chance: float
+    alternatives: dict[str, Fit]
 
 
 def screen(
@@ -99,8 +111,10 @@ def screen(
         on_step: told what is being tried.
     """
     found = Screening()
-    draws: list[Array] = []
+    shares: list[Share] = []
     present = set(state.effects) | {added.effect for added in state.added}
+    tried: list[Added] = []
+    ranges = bench.ranges()
     for name, kind in catalogue().items():
         fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
         if name in present and name != "sensors":
@@ -109,37 +123,55 @@ def screen(
         if not fittings:
             found.skipped[name] = "declares no fitting"
             continue
-        if on_step is not None:
-            on_step(name)
-        best: Screened | None = None
         for fitting in fittings:
             if any(channel not in bench.channels for channel in fitting.needs):
+                continue
+            if (name, fitting.label) in {(added.effect, added.fitting.label) for added in state.added}:
                 continue
             if behind_sensor(bench, state, name, fitting):
                 found.skipped[name] = (
                     "acts on the load's side of the torque sensor, whose reading is the load"
                 )
                 continue
-            for added in starts(name, fitting, lines):
-                columns = traces(bench, state, predictions, added)
-                if columns is None or not np.any(columns):
-                    continue
-                share = _allowed(residual, columns, signed(fitting, len(added.orders)))
-                draws.append(share.chance)
-                if best is None or share.share > best.share.share:
-                    best = Screened(name, replace(added, coefficients=tuple(share.coefficients)), share)
-        if best is None:
+            tried += starts(name, fitting, lines, ranges)
+    if on_step is not None:
+        on_step(f"{len(tried)} traces")
+    best: dict[str, Screened] = {}
+    for added, columns in zip(tried, traces(bench, state, predictions, tried), strict=True):
+        if columns is None or not np.any(columns):
+            continue
+        share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
+        shares.append(share)
+        name = added.effect
+        if name not in best or share.share > best[name].share.share:
+            best[name] = Screened(
+                name, replace(added, coefficients=tuple(share.coefficients)), share, columns
+            )
+    for name in catalogue():
+        if name not in best:
             found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
-        else:
-            found.ranked.append(best)
+    found.ranked += best.values()
     found.ranked.sort(key=lambda one: -one.share.share)
     if found.ranked:
-        found.chance = chance_of(found.ranked[0].share.share, draws)
+        found.chance = chance_of(found.ranked[0].share, shares)
     return found
 
 
-def starts(name: str, fitting: Fitting, lines: Sequence[Line]) -> list[Added]:
-    """The effect at unit size with every combination of its shapes' starts."""
+def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[str, float]) -> list[Added]:
+    """The effect at unit size with every combination of its shapes' starts.
+
+    Args:
+        name: of the effect.
+        fitting: how it is fitted.
+        lines: peaks of the order spectra, for its periodic terms.
+        ranges: what the records cover, for units that are parts of it.
+
+    Returns:
+        Nothing when the record does not give what the fitting asks for.
+    """
+    if any(isinstance(t, Amplitude) and t.of_range and t.of_range not in ranges for t in fitting.terms):
+        return []
+    fitting = replace(fitting, terms=tuple(_sized(term, ranges) for term in fitting.terms))
     orders: tuple[float, ...] = ()
     for term in fitting.terms:
         if isinstance(term, Periodic):
@@ -154,6 +186,13 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line]) -> list[Added]:
     ]
 
 
+def _sized(term: Any, ranges: Mapping[str, float]) -> Any:
+    if not isinstance(term, Amplitude) or not term.of_range:
+        return term
+    units = {path: unit * ranges[term.of_range] for path, unit in term.units.items()}
+    return replace(term, units=units, of_range="")
+
+
 def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bool:
     """Whether an effect acts on the output, in records whose load is what the output's torque sensor reads.
 
@@ -162,35 +201,54 @@ def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bo
     first = bench.predictors[0]
     if first.plan.load != "output_torque":
         return False
-    for added in starts(name, fitting, ())[:1]:
+    for added in starts(name, fitting, (), {})[:1]:
         try:
             without = first.predict(state.candidate())
             tried = replace(state, added=(*state.added, added))
             there = first.predict(tried.candidate())
         except PredictionError:
             return True
-        torque = float(np.std(there["output_torque"] - without["output_torque"])) / abs(first.ratio)
+        torque = float(np.std(there[CARRIED] - without[CARRIED])) / abs(first.ratio)
         motor = float(np.std(there.get("motor_torque", np.zeros(1)) - without.get("motor_torque", 0.0)))
         return torque > 0.5 * motor and torque > 0.0
     return False
 
 
-def traces(bench: Bench, state: State, predictions: Sequence[Array], added: Added) -> Array | None:
-    """Change of the whitened predictions for each coefficient at 1 alone, shape (rows, k)."""
-    columns = []
-    before = predictions
-    for k in range(len(added.coefficients)):
+def traces(
+    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added]
+) -> list[Array | None]:
+    """Change of the whitened predictions for each coefficient at 1 alone, shape (rows, k).
+
+    Args:
+        bench: the measured series.
+        state: the model without the effects.
+        predictions: its predictions.
+        tried: the effects; each is simulated apart.
+
+    Returns:
+        One design for each effect, None where it could not be predicted.
+    """
+    states = []
+    for added in tried:
+        count = len(added.coefficients)
         below = 1.0 if added.fitting.cumulative else 0.0
-        unit = tuple(1.0 if j == k else below if j < k else 0.0 for j in range(len(added.coefficients)))
-        tried = replace(state, added=(*state.added, replace(added, coefficients=unit)))
-        try:
-            there = bench.predict(tried.candidate(), tried.gain)
-        except PredictionError:
-            return None
-        columns.append(trace(bench, before, there))
-        if added.fitting.cumulative:
-            before = there
-    return np.column_stack(columns)
+        for k in range(count):
+            unit = tuple(1.0 if j == k else below if j < k else 0.0 for j in range(count))
+            states.append(replace(state, added=(*state.added, replace(added, coefficients=unit))))
+    there = iter(bench.predict_all(states))
+    found: list[Array | None] = []
+    for added in tried:
+        own = [next(there) for _ in added.coefficients]
+        columns: list[Array] = []
+        before: Sequence[Array] = predictions
+        for one in own:
+            if one is None:
+                break
+            columns.append(trace(bench, before, one))
+            if added.fitting.cumulative:
+                before = one
+        found.append(np.column_stack(columns) if len(columns) == len(own) else None)
+    return found
 
 
 def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:
@@ -213,6 +271,7 @@ def name_effect(
     bench: Bench,
     base: Fit,
     screening: Screening,
+    residual: Residual,
     *,
     on_step: Callable[[str], object] | None = None,
 ) -> Named | None:
@@ -222,6 +281,7 @@ def name_effect(
         bench: the measured series.
         base: the fitted model without the effect.
         screening: the catalogue on the screen.
+        residual: what it was screened on.
         on_step: told what is being fitted.
     """
     best_share = screening.ranked[0].share.share
@@ -231,11 +291,8 @@ def name_effect(
     for one in shortlist:
         if on_step is not None:
             on_step(f"fitting {one.name}")
-        state = replace(base.state, added=(*base.state.added, one.added))
-        frees = [free for free in _at_present(base) if free.value > 0]
-        try:
-            found = fit(bench, state, frees, held_effects=len(base.state.added), evaluations=6, prune=False)
-        except (PredictionError, np.linalg.LinAlgError):
+        found = _fitted(bench, base, one.added)
+        if found is None:
             continue
         results.append((one.name, found, block_losses(bench, found.predictions)))
     if not results:
@@ -246,16 +303,58 @@ def name_effect(
     if explained <= 0:
         return None
     group = {}
+    on_screen = {one.name: one for one in shortlist}
     for other, _, rest in results[1:]:
         difference = rest - losses
         spread = float(np.sqrt(len(difference)) * difference.std())
+        if beside(residual, on_screen[name], on_screen[other]):
+            continue
         if difference.sum() < 2.0 * spread or difference.sum() < SAME * explained:
             group[other] = float((before - rest).sum()) / explained
-    return Named(name, found, losses, group, _confidence(results, {name, *group}))
+    return Named(
+        name,
+        found,
+        losses,
+        group,
+        _confidence(results, {name, *group}),
+        on_screen[name].share.share,
+        screening.chance,
+        {other: fitted for other, fitted, _ in results[1:]},
+    )
 
 
-def _at_present(base: Fit) -> list[Free]:
-    """The base's free numbers at their fitted values."""
+def _fitted(bench: Bench, base: Fit, added: Added) -> Fit | None:
+    """The model with an effect, from the re-fitted numbers and, where they went far, from the given ones.
+
+    A base without the effect may have bent its numbers far out of the way to stand in for it.
+    """
+    state = replace(base.state, added=(*base.state.added, added))
+    frees = [free for free in at_present(base) if free.value > 0]
+    begins: list[dict[str, float]] = [{}]
+    if any(abs(t) > FAR for t in base.theta):
+        begins.append({free.name: -float(t) for free, t in zip(base.frees, base.theta, strict=True)})
+    found: list[Fit] = []
+    for theta in begins:
+        try:
+            found.append(
+                fit(bench, state, frees, held_effects=len(base.state.added), evaluations=6, prune=False,
+                    theta=theta)
+            )  # fmt: skip
+        except (PredictionError, np.linalg.LinAlgError):
+            continue
+    if not found:
+        return None
+    return min(found, key=lambda one: float(block_losses(bench, one.predictions).sum()))
+
+
+def beside(residual: Residual, one: Screened, other: Screened) -> bool:
+    """Whether two traces are two effects rather than two names of one: each explains what the other can't."""
+    both = residual.share(np.hstack([one.columns, other.columns])).share
+    return both - one.share.share > BESIDE * other.share.share
+
+
+def at_present(base: Fit) -> list[Free]:
+    """A fit's free numbers at their fitted values."""
     return [
         replace(free, value=free.value * float(np.exp(t)))
         for free, t in zip(base.frees, base.theta, strict=True)
@@ -266,6 +365,16 @@ def block_losses(bench: Bench, predictions: Sequence[Array]) -> Array:
     """Power of the whitened training residual in each block, shape (blocks,)."""
     rest = bench.stacked(bench.residuals(predictions))
     return np.asarray(np.bincount(bench.stacked_blocks(), rest**2, bench.blocks), dtype=float)
+
+
+def channel_powers(bench: Bench, predictions: Sequence[Array]) -> dict[str, float]:
+    """Power of the whitened training residual in each channel."""
+    residuals = bench.residuals(predictions)
+    found = dict.fromkeys(bench.channels, 0.0)
+    for series, residual in zip(bench.series, residuals, strict=True):
+        if series.record < bench.training:
+            found[series.channel] += float(np.sum((residual[series.train] / series.sigma) ** 2))
+    return found
 
 
 def _confidence(results: list[tuple[str, Fit, Array]], group: set[str], draws: int = 400) -> float:

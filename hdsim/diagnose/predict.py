@@ -2,7 +2,9 @@
 
 The motion is prescribed, so an unstable or unknown controller does not matter and nothing drifts away.
 With both encoders the motor's motion is prescribed, output motion and torques are predicted. Without the
-motor's encoder the output's motion times the ratio stands for it, and torques are predicted.
+motor's encoder the output's motion times the ratio stands for it, and torques are predicted. Where the
+reading of the output's torque sensor is the load, the sensor is compared with the slow part of its own
+reading: its ripple is faster than a load that is carried.
 """
 
 from __future__ import annotations
@@ -24,6 +26,10 @@ if TYPE_CHECKING:
 
 #: Time for which the model runs before the record begins, so that its own oscillation has died away, s.
 LEAD_IN_S = 0.5
+#: Name of the torque that a model's output carries, where the sensor's reading is given.
+CARRIED = "carried_torque"
+#: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
+SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 #: Relative tolerance of predictions: tight against the steps of finite differences.
 RTOL = 1e-5
 
@@ -108,8 +114,6 @@ def plan_for(record: Record, *, load: LoadSource | None = None, output_locked: b
     predicted = [c for c in ("motor_torque", "output_angle", "output_torque") if c in moving]
     if motion == "output_angle" or output_locked:
         predicted = [c for c in predicted if c != "output_angle"]
-    if load == "output_torque":
-        predicted = [c for c in predicted if c != "output_torque"]
     if not predicted:
         raise InputError(
             f"{record.name}: nothing can be predicted from {', '.join(sorted(has))}: with {motion} given, "
@@ -143,6 +147,11 @@ class Predictor:
             breaks, coefficients = smoothed(record.time, record.filled(plan.load))
             sign = -1.0 if plan.load == "output_torque" else 1.0
             self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
+        self._slow: SlowPart | None = None
+        if plan.load == "output_torque":
+            factor = ratio if plan.motion == "output_angle" else 1.0
+            self._slow = SlowPart(record.time, factor * values / (2 * np.pi))
+            self._slow_torque = self._slow.of(record.filled("output_torque"))
         motion = self.motion.values(record.time + LEAD_IN_S)
         #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
         self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
@@ -193,10 +202,39 @@ class Predictor:
         for channel in self.plan.channels:
             source = f"measured_{channel}" if f"measured_{channel}" in got else channel
             found[channel] = _interpolated(got.time, got[source], at)
-        if self.plan.load == "output_torque":
+        if self._slow is not None:
             # Not compared, but it tells an effect that acts behind the sensor, where none can be seen.
-            found["output_torque"] = _interpolated(got.time, got["output_torque"], at)
+            found[CARRIED] = _interpolated(got.time, got["output_torque"], at)
+            if "output_torque" in found:
+                # What the sensor adds, and of that what a slow load could not be.
+                own = found["output_torque"] - found[CARRIED]
+                own = own - self._slow.of(own) if np.any(own) else own
+                found["output_torque"] = self._slow_torque + own
         return found
+
+
+class SlowPart:
+    """What of a channel is slower than a part of a wave-generator turn: a least-squares cubic spline.
+
+    Args:
+        time: shape (n,), s.
+        turns: shape (n,), angle of the wave generator, turns.
+    """
+
+    def __init__(self, time: Array, turns: Array) -> None:
+        n = len(time)
+        steps = np.abs(np.diff(turns)) / SLOW_KNOTS_TURNS + np.diff(time) / SLOW_KNOTS_S
+        # A knot every few samples at most: finer ones would follow the noise.
+        clock = np.concatenate([[0.0], np.cumsum(np.minimum(steps, 0.1))])
+        inner = np.interp(np.arange(1.0, np.floor(clock[-1])), clock, time)
+        self.time = time
+        self._knots = np.concatenate([[time[0]] * 4, inner[: n // 4], [time[-1]] * 4])
+
+    def of(self, values: Array) -> Array:
+        """The slow part of values of shape (n,)."""
+        from scipy.interpolate import make_lsq_spline
+
+        return np.asarray(make_lsq_spline(self.time, values, self._knots, k=3)(self.time))
 
 
 def unloaded_angle(record: Record) -> float:

@@ -5,13 +5,15 @@ removes in blocks that it has not seen, after the base model's own sensitivities
 columns and residual alike, so that nothing a wrong parameter explains counts. The chance level of the
 best share of a whole search comes from the wild bootstrap with blocks as clusters (Cameron, Gelbach and
 Miller 2008, Review of Economics and Statistics 90:414): the residual's blocks with random signs, searched
-in the same way; the largest share of each draw counts (Westfall and Young 1993, Resampling-Based Multiple
-Testing).
+in the same way; the most remarkable share of each draw counts (Westfall and Young 1993,
+Resampling-Based Multiple Testing).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,9 +116,28 @@ class Residual:
         return Share(1.0 - float(losses.sum()) / total, losses, coefficients, -draws / total)
 
 
-def chance_of(best: float, draws: list[Array]) -> float:
-    """Probability that a search over all these designs finds a share as large as ``best`` by chance."""
-    if not draws:
+def chance_of(best: Share, everything: Sequence[Share]) -> float:
+    """Probability that a search over all these designs finds one as remarkable as ``best`` by chance.
+
+    A share is remarkable when it is large, or large beside its own spread over the surrogates: the first
+    suits a design with few but strong moments, the second one that would drown beside a freer design. Both
+    are asked, so the smaller probability is doubled (Bonferroni).
+
+    Args:
+        best: of the design that is asked for.
+        everything: of all designs that were tried, ``best`` among them.
+    """
+    if not everything:
         return 1.0
+    plain = _tail(best.share, [one.chance for one in everything])
+    scaled = _tail(_standard(best.share, best), [_standard(one.chance, one) for one in everything])
+    return min(1.0, 2.0 * min(plain, scaled))
+
+
+def _tail(value: float, draws: Sequence[Array]) -> float:
     largest = np.max(np.stack(draws), axis=0)
-    return float((1 + np.sum(largest >= best)) / (1 + len(largest)))
+    return float((1 + np.sum(largest >= value)) / (1 + len(largest)))
+
+
+def _standard(share: Any, of: Share) -> Any:
+    return (share - of.chance.mean()) / max(float(of.chance.std()), 1e-12)

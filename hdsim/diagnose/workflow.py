@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from hdsim.diagnose.add import fitted_numbers
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.check import Check, check_record
 from hdsim.diagnose.fit import Fit, added_spreads, base_intervals
 from hdsim.diagnose.freedom import Interval, State, state_of
-from hdsim.diagnose.locate import Location, locate
 from hdsim.diagnose.measured import Array, Record, record_from
-from hdsim.diagnose.name import LEAST_SHARE, LEVEL, Named, Screening, block_losses, name_effect, screen
+from hdsim.diagnose.name import LEVEL, Named, block_losses
 from hdsim.diagnose.predict import LoadSource, predictors
 from hdsim.diagnose.prove import gaps
-from hdsim.diagnose.refit import Refit, refit, reweigh
-from hdsim.diagnose.screen import Residual
+from hdsim.diagnose.refit import Refit, refit
+from hdsim.diagnose.search import Stage, search
 from hdsim.diagnose.verdict import DataProblem, FittedNumber, Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
@@ -31,23 +28,11 @@ if TYPE_CHECKING:
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
 
-#: Most effects that one diagnosis adds.
-MOST_EFFECTS = 4
 #: Share of the weighed residual that must be structured for ``unknown``, and the part of all structure that
 #: the named effects must explain to be believed.
 STRUCTURED, ADEQUATE = 0.12, 0.7
 #: Least relative fall of a held-out gap for the verdict ``parameter``.
 LEAST_FALL = 0.03
-
-
-@dataclass
-class Stage:
-    """One pass of locate and name."""
-
-    title: str
-    location: Location
-    screening: Screening | None = None
-    named: Named | None = None
 
 
 @dataclass
@@ -92,7 +77,7 @@ def diagnose(
     tell = on_step or (lambda _: None)
     seconds: dict[str, float] = {}
 
-    @contextmanager
+    @contextlib.contextmanager
     def step(name: str, text: str) -> Iterator[None]:
         tell(text)
         started = time.perf_counter()
@@ -119,40 +104,17 @@ def diagnose(
     start = state_of(scenario)
     with step("refit", "re-fitting the model's own numbers"):
         base = refit(bench, start)
-    current = base.fit
-    stages: list[Stage] = []
-    named: list[Named] = []
-    while True:
-        title = "refit" if not named else f"with {named[-1].name}"
-        residuals = bench.residuals(current.predictions)
-        left = _left(bench, current, residuals)
-        with step("locate", f"locating what is left {title}"):
-            stages.append(Stage(title, locate(bench, left, residuals)))
-        stage = stages[-1]
-        if len(named) == MOST_EFFECTS:
-            break
-        with step("screen", "screening the catalogue"):
-            stage.screening = screen(
-                bench, current.state, current.predictions, left, stage.location.lines,
-                on_step=lambda effect: tell(f"screening {effect}"),
-            )  # fmt: skip
-        ranked = stage.screening.ranked
-        if not ranked or stage.screening.chance > LEVEL:
-            break
-        # A later effect has to matter beside what the first one explained.
-        first = float(block_losses(bench, base.fit.predictions).sum())
-        if ranked[0].share.share * left.power < LEAST_SHARE * first:
-            break
-        with step("fit", "fitting the shortlist"):
-            found = name_effect(bench, current, stage.screening, on_step=tell)
-        if found is None:
-            break
-        if block_losses(bench, current.predictions).sum() - found.losses.sum() < LEAST_SHARE * first:
-            break
-        stage.named = found
-        named.append(found)
-        current = found.fit
-        reweigh(bench, current)
+
+    running = contextlib.ExitStack()
+
+    def during(name: str, text: str) -> Callable[[str], object]:
+        running.close()
+        running.enter_context(step(name, text))
+        return tell
+
+    with running:
+        found = search(bench, base.fit, during)
+    current, stages, named, left = found.fit, found.stages, found.named, found.left
     explained = float(
         (block_losses(bench, base.fit.predictions) - block_losses(bench, current.predictions)).sum()
     )
@@ -181,8 +143,7 @@ def diagnose(
     }
     if unknown:
         place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
-        suspects = {n.name: round(float(s.screening.ranked[0].share.share), 3)
-                    for n, s in zip(named, stages, strict=False) if s.screening}  # fmt: skip
+        suspects = {one.name: round(one.share, 3) for one in named}
         verdict = Verdict(
             verdict="unknown",
             sentence="Something is missing that nothing in the catalogue explains: "
@@ -192,7 +153,7 @@ def diagnose(
             **common,
         )
     elif named:
-        effects = _effects(named, stages)
+        effects = _effects(named, current)
         words = " and ".join(_words(effect) for effect in effects)
         verdict = Verdict(
             verdict="effect", sentence=f"The model is missing {words}.", effects=effects, **common
@@ -212,27 +173,15 @@ def diagnose(
     return Diagnosis(verdict, checks, bench, base, stages, current, start, predictions)
 
 
-def _left(bench: Bench, current: Fit, residuals: list[Array]) -> Residual:
-    """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
-    numbers = bench.stacked_series()
-    offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
-    base = np.hstack([current.columns, offsets])
-    return Residual(bench.stacked(residuals), base, bench.stacked_blocks())
-
-
 def _number(interval: Interval) -> FittedNumber:
     bounds = (interval.low, interval.high) if interval.determined else None
     return FittedNumber(value=interval.value, interval=bounds, start=interval.start, tied_to=interval.tied_to)
 
 
-def _effects(named: Sequence[Named], stages: Sequence[Stage]) -> list[NamedEffect]:
+def _effects(named: Sequence[Named], final: Fit) -> list[NamedEffect]:
     known = catalogue()
     found = []
-    for k, one in enumerate(named):
-        screening = stages[k].screening
-        assert screening is not None
-        shares = {s.name: s.share.share for s in screening.ranked}
-        added, covariance, shapes = added_spreads(one.fit, k)[0]
+    for one, (added, covariance, shapes) in zip(named, added_spreads(final), strict=True):
         confused = known[one.name].signature.confused_with
         found.append(
             NamedEffect(
@@ -241,8 +190,8 @@ def _effects(named: Sequence[Named], stages: Sequence[Stage]) -> list[NamedEffec
                     [known[one.name].title, f"({added.fitting.label})" if added.fitting.label else ""]
                 ).strip(),
                 confidence=one.confidence,
-                chance=screening.chance,
-                explained=shares[one.name],
+                chance=one.chance,
+                explained=one.share,
                 parameters=fitted_numbers(added, covariance, shapes),
                 indistinguishable_from=list(one.group),
                 separated_by={

@@ -14,10 +14,17 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Amplitude:
-    """Fields that grow in proportion to one coefficient: field to its value at coefficient 1."""
+    """Fields that grow in proportion to one coefficient.
+
+    Args:
+        units: field to its value at coefficient 1.
+        signed: the coefficient may be negative.
+        of_range: the units are parts of a range that the record covers: ``twist_arcmin``, if any.
+    """
 
     units: Mapping[str, float]
     signed: bool = False
+    of_range: str = ""
 
 
 @dataclass(frozen=True)

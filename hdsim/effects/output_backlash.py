@@ -32,7 +32,10 @@ class OutputBacklash(Effect):
             "segment",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Amplitude({"backlash_arcmin": 0.3}),)),)
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Amplitude({"backlash_arcmin": 0.3}),)),
+        Fitting((Amplitude({"backlash_arcmin": 0.5}, of_range="twist_arcmin"),)),
+    )
 
     backlash_arcmin: float = Field(0.15, ge=0)
     """Additional total play at the output, arcmin."""

@@ -1,0 +1,163 @@
+"""Steps 4 to 6 in turn: locate, name, add, until nothing significant is left.
+
+The first names are given while other effects are still missing, so each is asked again once there are
+several: the model without it, but with all others, is screened anew, and the best effect there takes its
+place or, when nothing significant is missing there, none does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.fit import Fit, fit
+from hdsim.diagnose.freedom import State
+from hdsim.diagnose.locate import Line, Location, locate, order_lines
+from hdsim.diagnose.measured import Array
+from hdsim.diagnose.name import (
+    LEVEL,
+    SAME,
+    Named,
+    Screening,
+    at_present,
+    block_losses,
+    channel_powers,
+    name_effect,
+    screen,
+)
+from hdsim.diagnose.predict import PredictionError
+from hdsim.diagnose.refit import reweigh
+from hdsim.diagnose.screen import Residual
+
+#: Most effects that one diagnosis adds.
+MOST_EFFECTS = 4
+#: Part of a channel's first residual that a later effect must explain.
+LATER_SHARE = 0.015
+
+Step = Callable[[str], object]
+
+
+@dataclass
+class Stage:
+    """One pass of locate and name."""
+
+    title: str
+    location: Location
+    screening: Screening | None = None
+    named: Named | None = None
+
+
+@dataclass
+class Search:
+    """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit."""
+
+    fit: Fit
+    left: Residual
+    stages: list[Stage] = field(default_factory=list)
+    named: list[Named] = field(default_factory=list)
+
+
+def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Search:
+    """Add effects until nothing significant is left.
+
+    Args:
+        bench: the measured series, weighed.
+        base: the re-fitted model.
+        during: told the step that begins and what it does; returns who is told the details.
+    """
+    current = base
+    found = Search(base, _left(bench, base))
+    while True:
+        title = "refit" if not found.named else f"with {found.named[-1].name}"
+        during("locate", f"locating what is left {title}")
+        found.left = _left(bench, current)
+        stage = Stage(title, locate(bench, found.left, bench.residuals(current.predictions)))
+        found.stages.append(stage)
+        if len(found.named) == MOST_EFFECTS:
+            break
+        tell = during("screen", "screening the catalogue")
+        stage.screening = screen(
+            bench, current.state, current.predictions, found.left, stage.location.lines, on_step=tell
+        )
+        if not stage.screening.ranked or stage.screening.chance > LEVEL:
+            break
+        tell = during("fit", "fitting the shortlist")
+        named = name_effect(bench, current, stage.screening, found.left, on_step=tell)
+        if named is None or not _matters(bench, base, current, named.fit):
+            break
+        stage.named = named
+        found.named.append(named)
+        current = named.fit
+        reweigh(bench, current)
+        if len(found.named) > 1:
+            tell = during("again", "asking each name again beside the others")
+            current = _again(bench, base, _together(bench, current), found, tell)
+            reweigh(bench, current)
+    found.fit = current
+    return found
+
+
+def _matters(bench: Bench, base: Fit, before: Fit, after: Fit) -> bool:
+    """Whether an effect explains enough beside what was there first, in one channel at least."""
+    first, last, now = (channel_powers(bench, each.predictions) for each in (base, before, after))
+    return max(last[c] - now[c] - LATER_SHARE * first[c] for c in first) >= 0
+
+
+def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
+    """All numbers fitted together: the base's and those of all effects."""
+    return fit(bench, state or found.state, at_present(found), evaluations=4, prune=False)
+
+
+def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:
+    """Ask every name but the last again; ``found.named`` is changed in place."""
+    k = 0
+    while k < len(found.named) - 1:
+        own = found.named[k]
+        added = list(current.state.added)
+        others = added[:k] + added[k + 1 :]
+        try:
+            without = _together(bench, current, replace(current.state, added=tuple(others)))
+        except (PredictionError, np.linalg.LinAlgError):
+            k += 1
+            continue
+        left = _left(bench, without)
+        lines: list[Line] = []
+        residuals = bench.residuals(without.predictions)
+        for channel in bench.channels:
+            lines += order_lines(bench, residuals, channel)
+        tell(f"{own.name} again")
+        screening = screen(bench, without.state, without.predictions, left, lines)
+        named = None
+        if screening.ranked and screening.chance <= LEVEL:
+            named = name_effect(bench, without, screening, left, on_step=tell)
+        if named is None or not _matters(bench, base, without, named.fit):
+            # The others explain what it did.
+            found.named.pop(k)
+            current = without
+            continue
+        loss, now = (float(block_losses(bench, each.predictions).sum()) for each in (current, named.fit))
+        same = named.name == own.name or own.name in named.group
+        if same or now < (1.0 - SAME) * loss:
+            own = named if named.name == own.name or not same else own
+            if own is named:
+                # It was fitted last: back to its place.
+                fitted = named.fit.state.added[-1]
+                state = replace(named.fit.state, added=(*others[:k], fitted, *others[k:]))
+                current = _together(bench, named.fit, state)
+            else:
+                own.group = {name: part for name, part in named.group.items() if name != own.name}
+                own.group[named.name] = 1.0
+            found.named[k] = own
+        k += 1
+    return current
+
+
+def _left(bench: Bench, current: Fit) -> Residual:
+    """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
+    numbers = bench.stacked_series()
+    offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
+    columns: Array = np.hstack([current.columns, offsets])
+    return Residual(bench.stacked(bench.residuals(current.predictions)), columns, bench.stacked_blocks())
