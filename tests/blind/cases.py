@@ -1,129 +1,279 @@
-"""The blind matrix: which plants, how strong, and what counts as right."""
+"""The blind matrix: which plants, how visible, and which answers are right."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from plants import Case, Sensors, truth
+from drives import DRIVES
+from hidden import ANY, EFFECTS, KNOWN, MOVING, OUTSIDE, Expected, Hidden
+from sensing import CHANNELS, DIRT, Setup
+from strength import Strength, strength
 
-#: Size of an effect's trace over the channel's noise, in the channel where it is strongest.
-STRENGTHS = {"clear": 5.0, "fair": 2.0, "faint": 0.7}
-
-#: Plants of each effect at a size that is scaled afterwards: truth, numbers, and the number that scales.
-EFFECTS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
-    "kinematic_error": (
-        {"ke_order": 2.0, "ke_amplitude": 4e-5, "ke_phase": 1.0, "ke_order2": 2.0, "ke_amplitude2": 2e-5},
-        ("ke_amplitude", "ke_amplitude2"),
-    ),
-    "wave_generator_eccentricity": ({"wg_once": 2e-5}, ("wg_once",)),
-    "stribeck_friction": ({"stribeck_extra": 0.02, "stribeck_speed": 6.0}, ("stribeck_extra",)),
-    "lugre_friction": (
-        {"lugre_static": 0.06, "lugre_stiffness": 6.0, "lugre_speed": 5.0}, ("lugre_static",),
-    ),
-    "motor_torque_ripple": (
-        {"ripple_order": 12.0, "ripple_torque": 0.01, "ripple_phase": 0.6}, ("ripple_torque",),
-    ),
-    "load_side_friction": ({"load_coulomb": 1.0, "load_viscous": 0.8}, ("load_coulomb", "load_viscous")),
-    "torsional_hysteresis": ({"maxwell_torque": 1.0, "maxwell_scale": 6e-4}, ("maxwell_torque",)),
-    "output_backlash": ({"gap": 2e-5}, ("gap",)),
-    "stiffness_nonlinearity": ({"cubic": 3e9}, ("cubic",)),
-    "unbalance": ({"unbalance": 1.0, "unbalance_phase": 0.9}, ("unbalance",)),
-    "output_eccentricity": ({"encoder_once": 2e-5, "encoder_phase": 0.8}, ("encoder_once",)),
-    "delay": ({"delay": 1e-4}, ("delay",)),
-    "torque_sensor_ripple": ({"sensor_order": 2.0, "sensor_ripple": 0.3}, ("sensor_ripple",)),
+#: Visible strength (see ``strength``) by group.
+STRENGTHS = {
+    "clear": 5.0, "matching": 5.0, "fair": 2.0, "faint": 0.7, "pair": 4.0, "outside": 5.0, "missing": 5.0,
+    "dirty": 5.0,
 }  # fmt: skip
-#: Names that count as right for a truth, where it isn't one name of the catalogue.
-ACCEPTED = {
-    "torsional_hysteresis": {"torsional_hysteresis_duhem", "torsional_hysteresis_maxwell"},
-    "delay": {"sensors"},
-    "torque_sensor_ripple": {"sensors"},
-    "output_eccentricity": {"sensors", "output_eccentricity"},
+#: Tries at a drive and a motion in which the effect can reach its strength, and its tolerance.
+TRIES, TOLERANCE = 8, 0.08
+
+PAIRS = (
+    ("kinematic_error", "stribeck_friction"),
+    ("motor_torque_ripple", "load_side_friction"),
+    ("output_backlash", "load_side_friction"),
+    ("torsional_hysteresis_maxwell", "kinematic_error"),
+    ("lugre_friction", "wave_generator_eccentricity"),
+    ("torque-sensor ripple", "stribeck_friction"),
+    ("load_dependent_loss", "kinematic_error"),
+    ("output encoder delay", "motor_torque_ripple"),
+    ("unbalance", "input_coulomb_viscous"),
+)
+#: The base's numbers: names in the plant, path in the scenario.
+PARAMETERS = {
+    "load inertia": (("load_inertia",), "load.inertia_kg_m2"),
+    "motor inertia": (("motor_inertia",), "drive.inertia.motor_kg_m2"),
+    "stiffness": (("k1", "k2", "k3"), "drive.torsion.stiffness_k1_nm_per_rad"),
+    "Coulomb friction": (("coulomb",), "drive.friction.coulomb_nm"),
+    "viscous friction": (("viscous",), "drive.friction.viscous_nm_s_per_rad"),
+    "torque constant": (("gain",), "motor_torque_gain"),
+    "mass": (("arm",), "load.gravity.mass_kg"),
+    "load-dependent loss": (("load_loss",), "drive.friction.load_coefficient"),
 }
-OUTSIDE: dict[str, dict[str, float]] = {
-    "spring catch": {"spring_kick": 3.0},
-    "cable": {"cable": 4.0},
-    "drifting torque": {"drift": 0.04},
+TWO_PARAMETERS = (
+    ("load inertia", "Coulomb friction"), ("motor inertia", "viscous friction"), ("stiffness", "mass"),
+    ("Coulomb friction", "viscous friction"), ("torque constant", "stiffness"), ("load inertia", "mass"),
+    ("Coulomb friction", "load-dependent loss"), ("torque constant", "viscous friction"),
+)  # fmt: skip
+WITHOUT = {
+    "no output torque": tuple(c for c in CHANNELS if c != "output_torque"),
+    "no output angle": tuple(c for c in CHANNELS if c != "output_angle"),
+    "no motor angle": tuple(c for c in CHANNELS if c != "motor_angle"),
 }
-PARAMETERS: dict[str, dict[str, float]] = {
-    "load inertia +20 %": {"load_inertia": 0.6},
-    "motor inertia +30 %": {"motor_inertia": 9.0e-5},
-    "stiffness -15 %": {"k1": 1.36e4, "k2": 2.125e4, "k3": 2.465e4},
-    "Coulomb friction +30 %": {"coulomb": 0.039},
-    "viscous friction -30 %": {"viscous": 2.45e-4},
-    "torque constant +10 %": {"gain": 1.1},
-}
-PAIRS = (("kinematic_error", "stribeck_friction"), ("motor_torque_ripple", "load_side_friction"))
+MISSING = (
+    ("no output torque", "kinematic_error"), ("no output torque", "stribeck_friction"),
+    ("no output torque", "output_backlash"), ("no output torque", "load_side_friction"),
+    ("no output torque", "nothing"),
+    ("no output angle", "motor_torque_ripple"), ("no output angle", "stribeck_friction"),
+    ("no output angle", "load_dependent_loss"), ("no output angle", "torque-sensor ripple"),
+    ("no output angle", "nothing"),
+    ("no motor angle", "stribeck_friction"), ("no motor angle", "load_side_friction"),
+    ("no motor angle", "input_coulomb_viscous"), ("no motor angle", "nothing"),
+)  # fmt: skip
+DIRTY = ("nothing", "kinematic_error", "stribeck_friction", "motor_torque_ripple", "nothing",
+         "torsional_hysteresis_maxwell", "load_side_friction")  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A case, its group and what counts as right."""
+    """One case of the matrix, before its plant is made.
+
+    Attributes:
+        group: what it counts towards.
+        truth: what is hidden; after a ``#`` a number that only tells cases apart.
+        seed: seed.
+        effects: names of what is hidden, of ``hidden``.
+        parameters: names of the base's numbers that are off.
+        channels: channels that the log has.
+        dirt: what is wrong with the log.
+    """
 
     group: str
-    case: Case
-    accepted: tuple[frozenset[str], ...] = ()
-    friction_free_base: bool = False
+    truth: str
+    seed: int
+    effects: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    channels: tuple[str, ...] = CHANNELS
+    dirt: str = ""
+
+    @property
+    def key(self) -> str:
+        """What ``--only`` takes."""
+        return f"{self.group}/{self.truth}/{self.seed}"
+
+    @property
+    def row(self) -> str:
+        """Row of the confusion matrix."""
+        return self.truth.partition("#")[0]
+
+    @property
+    def accepted(self) -> list[frozenset[str]]:
+        """For each hidden effect, the names that are right."""
+        return [frozenset(KNOWN[name].accepted or (name,)) for name in self.effects]
 
 
-def trials(seeds: int) -> Iterator[Trial]:
-    """The matrix over ``seeds`` seeds."""
-    for seed in range(seeds):
-        sensors = Sensors()
-        yield Trial("null", Case("nothing", seed=seed))
-        yield Trial("null", Case("nothing, dirty", {}, replace(sensors, spikes=25, jitter=2e-4), seed=seed))
-        for name, changes in PARAMETERS.items():
-            yield Trial("parameter", Case(name, changes, seed=seed))
-        for strength, multiple in STRENGTHS.items():
-            for name in EFFECTS:
-                yield Trial(strength, Case(name, sized(name, multiple), seed=seed), (accepted(name),))
-        yield Trial(
-            "clear", Case("input_coulomb_viscous", seed=seed), (accepted("input_coulomb_viscous"),), True
+@dataclass(frozen=True)
+class Case:
+    """A trial with its experiment and its plant."""
+
+    trial: Trial
+    setup: Setup
+    changes: dict[str, float]
+    strengths: tuple[Strength, ...] = ()
+    expected: Expected = field(default_factory=dict)
+    reached: bool = True
+
+
+def trials(seeds: Iterable[int]) -> Iterator[Trial]:
+    """The matrix over seeds; each seed has every kind of case, and a rotating choice where there are many."""
+    for seed in seeds:
+        for k in range(15):
+            yield Trial("null", f"nothing#{k}", seed)
+        yield Trial("null", "nothing, spikes", seed, dirt="spikes")
+        yield Trial("null", "nothing, jitter", seed, dirt="jitter")
+        for name in PARAMETERS:
+            yield Trial("parameter", name, seed, parameters=(name,))
+        for pair in TWO_PARAMETERS:
+            yield Trial("parameter", " + ".join(pair), seed, parameters=pair)
+        for k, effect in enumerate(EFFECTS):
+            names = (effect.name,)
+            yield Trial("clear", effect.name, seed, names)
+            if (k + seed) % 2:
+                yield Trial("matching", effect.name, seed, names)
+            if (k + seed) % 4:
+                yield Trial("fair", effect.name, seed, names)
+            if (k + seed) % 5 < 3:
+                yield Trial("faint", effect.name, seed, names)
+        for k, both in enumerate(PAIRS):
+            if (k + seed) % 5:
+                yield Trial("pair", " + ".join(both), seed, both)
+        for effect in OUTSIDE:
+            yield Trial("outside", effect.name, seed, (effect.name,))
+        for k, (what, name) in enumerate(MISSING):
+            if (k + seed) % 2:
+                names = () if name == "nothing" else (name,)
+                yield Trial("missing", f"{name}, {what}", seed, names, channels=WITHOUT[what])
+        for k, dirt in enumerate(DIRT):
+            name = DIRTY[(k + seed) % len(DIRTY)]
+            names = () if name == "nothing" else (name,)
+            yield Trial("dirty", f"{name}, {dirt}", seed, names, dirt=dirt)
+
+
+def case_of(trial: Trial) -> Case:
+    """Choose the experiment, size the plant. The choice follows from the trial's key alone."""
+    best: Case | None = None
+    for attempt in range(TRIES):
+        rng = np.random.default_rng(
+            [trial.seed, zlib.crc32(f"{trial.group}/{trial.truth}".encode()), attempt]
         )
-        for first, second in PAIRS:
-            both = sized(first, 4.0) | sized(second, 4.0)
-            yield Trial(
-                "pair", Case(f"{first} + {second}", both, seed=seed), (accepted(first), accepted(second))
-            )
-        for name, changes in OUTSIDE.items():
-            yield Trial("outside", Case(name, changes, seed=seed))
+        setup = _setup(trial, rng)
+        # Where an effect cannot be seen at a physical size, better sensors are tried.
+        setup = replace(setup, noise=setup.noise * 0.75**attempt)
+        if trial.parameters:
+            case = _off(trial, setup, rng)
+        elif trial.effects:
+            case = _sized(trial, setup, rng)
+        else:
+            return Case(trial, setup, {})
+        if case.reached:
+            return case
+        if best is None or min(s.beyond_base for s in case.strengths) > min(
+            s.beyond_base for s in best.strengths
+        ):
+            best = case
+    assert best is not None
+    return best
 
 
-def accepted(name: str) -> frozenset[str]:
-    """Names that count as right."""
-    return frozenset(ACCEPTED.get(name, {name}))
+def _setup(trial: Trial, rng: np.random.Generator) -> Setup:
+    hidden = [KNOWN[name] for name in trial.effects]
+    motions = [m for m in (ANY if not hidden else (*MOVING, "locked")) if all(m in h.motions for h in hidden)]
+    if (
+        "motor_angle" not in trial.channels
+        or "mass" in trial.parameters
+        or "load inertia" in trial.parameters
+    ):
+        motions = [m for m in motions if m != "locked"]
+    if trial.dirt or len(hidden) > 1:
+        motions = [m for m in motions if m != "locked"]
+    rates = (
+        set.intersection(*({500, 1000, 2000} & set(h.rates) for h in hidden)) if hidden else {500, 1000, 2000}
+    )
+    weights = {500: 0.3, 1000: 0.55, 2000: 0.15}
+    drawn = sorted(rates)
+    chances = np.array([weights[r] for r in drawn])
+    arm = any(h.arm for h in hidden) or bool({"mass", "load-dependent loss"} & set(trial.parameters))
+    motion = str(rng.choice(motions))
+    longest = max((h.seconds for h in hidden), default=0.0)
+    setup = Setup(
+        drive=DRIVES[rng.integers(len(DRIVES))],
+        motion=motion,
+        gravity=motion != "locked" and (arm or bool(rng.random() < 0.65)),
+        rate=int(rng.choice(drawn, p=chances / chances.sum())),
+        seconds=longest or float(rng.choice([8.0, 10.0, 10.0, 12.0, 12.0, 14.0])),
+        seed=(trial.seed, int(rng.integers(2**31))),
+        noise=float(np.exp(rng.uniform(np.log(0.6), np.log(1.6)))),
+        channels=trial.channels,
+        dirt=trial.dirt,
+        speed=max((h.speed for h in hidden), default=1.0),
+        lacks=tuple(name for h in hidden for name in h.lacks),
+    )
+    if "thermal_friction" in trial.effects and rng.random() < 0.5:
+        setup = replace(setup, channels=(*setup.channels, "temperature"))
+    return setup
 
 
-_UNITS: dict[str, float] = {}
+def _off(trial: Trial, setup: Setup, rng: np.random.Generator) -> Case:
+    """Numbers of the base off by 10 to 30 %, in an experiment in which each of them matters."""
+    from sensing import numbers
+
+    nominal = numbers(setup, {})._asdict()
+    changes: dict[str, float] = {}
+    expected: Expected = {}
+    strengths = []
+    for name in trial.parameters:
+        factor = 1.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.3))
+        plant, path = PARAMETERS[name]
+        own = {key: nominal[key] * factor for key in plant}
+        changes |= own
+        strengths.append(strength(setup, own))
+        value = own[plant[0]]
+        if name == "motor inertia":
+            # The scenario's number is the rotor's alone, the wave generator's stays.
+            value -= 0.25 * setup.drive.motor_inertia
+        elif name == "mass":
+            value /= 9.80665 * 0.3
+        expected[path] = value
+    return Case(trial, setup, changes, tuple(strengths), expected, min(s.plain for s in strengths) > 0.5)
 
 
-def sized(name: str, multiple: float) -> dict[str, float]:
-    """The plant's numbers that make the effect's largest trace ``multiple`` times its channel's noise."""
-    changes, scaling = EFFECTS[name]
-    if name not in _UNITS:
-        _UNITS[name] = _trace(changes)
-    factor = multiple / _UNITS[name]
-    scaled = {key: value * factor if key in scaling else value for key, value in changes.items()}
-    if name == "lugre_friction":
-        scaled["lugre_static"] = 0.03 + (changes["lugre_static"] - 0.03) * factor
-    return scaled
+def _sized(trial: Trial, setup: Setup, rng: np.random.Generator) -> Case:
+    """Every hidden effect at the group's strength."""
+    wanted = STRENGTHS[trial.group]
+    changes: dict[str, float] = {}
+    expected: Expected = {}
+    strengths, reached = [], True
+    for name in trial.effects:
+        hidden = KNOWN[name]
+        same = trial.group == "matching"
+        own, found = _size(hidden, setup, rng.uniform(size=6), wanted, same)
+        changes |= own
+        strengths.append(found)
+        reached = reached and bool(abs(np.log(found.beyond_base / wanted)) < 2 * TOLERANCE)
+        if same and hidden.expected is not None:
+            expected = hidden.expected(setup.drive, own)
+    return Case(trial, setup, changes, tuple(strengths), expected, reached)
 
 
-def _trace(changes: dict[str, float]) -> float:
-    """Root-mean-square change of a channel over its noise, the largest over the channels."""
-    sensors = Sensors()
-    with_it, without = (truth(Case("", c)) for c in (changes, {}))
-    ideal = [
-        np.column_stack([log[:, 1], log[:, 2] - log[:, 0] / -100.0, log[:, 3]]) for log in (with_it, without)
-    ]
-    change = ideal[0] - ideal[1]
-    if "delay" in changes:
-        change[:, 1] += changes["delay"] * np.gradient(without[:, 2], 1e-3)
-    if "encoder_once" in changes:
-        change[:, 1] += changes["encoder_once"] * np.sin(without[:, 2] + changes["encoder_phase"])
-    if "sensor_ripple" in changes:
-        change[:, 2] += changes["sensor_ripple"] * np.sin(changes["sensor_order"] * without[:, 0])
-    noise = np.array([sensors.motor_torque_noise, sensors.output_noise, sensors.output_torque_noise])
-    spread: np.ndarray = change.std(axis=0) / noise
-    return float(spread.max())
+def _size(
+    hidden: Hidden, setup: Setup, draws: np.ndarray, wanted: float, same: bool
+) -> tuple[dict[str, float], Strength]:
+    """Iterate the size until the strength beyond the base's numbers is the wanted one."""
+    size, power, last = hidden.start, 1.0, None
+    for _ in range(8):
+        changes = hidden.build(setup.drive, draws, size, same)
+        found = strength(setup, changes)
+        if abs(np.log(found.beyond_base / wanted)) < TOLERANCE:
+            break
+        at_end = size >= hidden.most and found.beyond_base < wanted
+        if at_end:
+            break
+        if last is not None and last[0] != size and found.beyond_base != last[1]:
+            slope = np.log(found.beyond_base / last[1]) / np.log(size / last[0])
+            power = float(np.clip(slope, 0.3, 3.0))
+        last = (size, found.beyond_base)
+        step = float(np.clip((wanted / max(found.beyond_base, 1e-12)) ** (1 / power), 0.02, 30.0))
+        size = min(size * step, hidden.most)
+    return changes, found

@@ -1,271 +1,349 @@
-"""Plants with a hidden effect, written apart from hdsim: own equations, own integrator, own sensors.
+"""Plants with a hidden effect, written apart from hdsim: own equations, own integrator.
 
-Coordinates are motor angle and output angle; a cascaded PI controller follows a reference. The effects use
-formulas that differ from the catalogue's wherever the literature has another one. Nothing here imports
-hdsim. Units are SI.
+Coordinates are motor angle m, output angle o, the housing's angle b and a spring-mounted mass a; a cascaded
+PI controller follows a reference at 2 kHz. Nothing here imports hdsim. Units are SI.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
+from motions import CONTROL_RATE
 from numba import njit
+from plant_numbers import Numbers
 
-RATIO = -100.0
-STEP = 5e-5  # s, of the integrator
-RATE = 1000  # Hz, of the log
-
-# Indices of the plant's numbers.
-NAMES = [
-    "motor_inertia",
-    "load_inertia",
-    "k1",
-    "k2",
-    "k3",
-    "t1",
-    "t2",
-    "damping",
-    "coulomb",
-    "viscous",
-    "load_loss",
-    "arm",
-    "gain",
-    "ke_order",
-    "ke_amplitude",
-    "ke_phase",
-    "ke_order2",
-    "ke_amplitude2",
-    "stribeck_extra",
-    "stribeck_speed",
-    "lugre_static",
-    "lugre_stiffness",
-    "lugre_speed",
-    "maxwell_torque",
-    "maxwell_scale",
-    "ripple_order",
-    "ripple_torque",
-    "ripple_phase",
-    "load_coulomb",
-    "load_viscous",
-    "gap",
-    "cubic",
-    "wg_once",
-    "unbalance",
-    "unbalance_phase",
-    "encoder_once",
-    "encoder_phase",
-    "delay",
-    "sensor_order",
-    "sensor_ripple",
-    "cable",
-    "spring_kick",
-    "thermal_rate",
-    "drift",
-    "output_locked",
-]
-AT = {name: k for k, name in enumerate(NAMES)}
-(
-    MOTOR_INERTIA, LOAD_INERTIA, K1, K2, K3, T1, T2, DAMPING, COULOMB, VISCOUS, LOAD_LOSS, ARM, GAIN,
-    KE_ORDER, KE_AMPLITUDE, KE_PHASE, KE_ORDER2, KE_AMPLITUDE2, STRIBECK_EXTRA, STRIBECK_SPEED, LUGRE_STATIC,
-    LUGRE_STIFFNESS, LUGRE_SPEED, MAXWELL_TORQUE, MAXWELL_SCALE, RIPPLE_ORDER, RIPPLE_TORQUE, RIPPLE_PHASE,
-    LOAD_COULOMB, LOAD_VISCOUS, GAP, CUBIC, WG_ONCE, UNBALANCE, UNBALANCE_PHASE, ENCODER_ONCE, ENCODER_PHASE,
-    DELAY, SENSOR_ORDER, SENSOR_RIPPLE, CABLE, SPRING_KICK, THERMAL_RATE, DRIFT, OUTPUT_LOCKED,
-) = range(len(NAMES))  # fmt: skip
-
-NOMINAL = {
-    "motor_inertia": 6.93e-5, "load_inertia": 0.5, "k1": 1.6e4, "k2": 2.5e4, "k3": 2.9e4, "t1": 7.0,
-    "t2": 25.0, "damping": 8.0, "coulomb": 0.03, "viscous": 3.5e-4, "load_loss": 0.06, "arm": 12.0,
-    "gain": 1.0,
-}  # fmt: skip
-
+STEPS = 10  # of the integrator in each period of the controller
+STEP = 1.0 / (CONTROL_RATE * STEPS)  # s
 SLIDERS = 12
+TABLE = 20001  # entries of the spring's table
 
 
 @njit(cache=True)
-def spring_torque(d, p):
-    """Three straight pieces over torque, secant stiffnesses; a gap takes its width first; a cubic adds."""
-    size = abs(d)
-    sign = 1.0 if d >= 0 else -1.0
-    size = max(0.0, size - 0.5 * p[GAP])
-    d1 = p[T1] / p[K1]
-    d2 = d1 + (p[T2] - p[T1]) / p[K2]
-    if size < d1:
-        t = p[K1] * size
-    elif size < d2:
-        t = p[T1] + p[K2] * (size - d1)
+def sign_of(speed, over, algebraic):
+    """A smooth sign."""
+    if algebraic > 0:
+        return speed / math.sqrt(speed * speed + 0.36 * over * over)
+    return math.tanh(speed / over)
+
+
+@njit(cache=True)
+def error_of(m, o, p):
+    """Kinematic error and its derivatives with respect to motor and output angle."""
+    e = p.ke_2 * math.sin(2 * m + p.ke_2_phase) + p.ke_4 * math.sin(4 * m + p.ke_4_phase)
+    by_m = 2 * p.ke_2 * math.cos(2 * m + p.ke_2_phase) + 4 * p.ke_4 * math.cos(4 * m + p.ke_4_phase)
+    turn = 2 * (m - o) + p.ke_rel_phase
+    e += p.ke_rel * math.sin(turn) + p.ke_6 * math.sin(6 * m + 0.3)
+    by_m += 2 * p.ke_rel * math.cos(turn) + 6 * p.ke_6 * math.cos(6 * m + 0.3)
+    by_o = -2 * p.ke_rel * math.cos(turn)
+    e += p.ke_out3 * math.sin(3 * o + 0.9) + p.out_once * math.sin(o + p.out_once_phase)
+    by_o += 3 * p.ke_out3 * math.cos(3 * o + 0.9) + p.out_once * math.cos(o + p.out_once_phase)
+    if p.wg_once > 0:
+        # With a skew the offset is seen in perspective: sin/(1 + k cos).
+        s, c = math.sin(m + p.wg_once_phase), math.cos(m + p.wg_once_phase)
+        below = 1.0 + p.wg_once_skew * c
+        e += p.wg_once * s / below
+        by_m += p.wg_once * (c * below + p.wg_once_skew * s * s) / (below * below)
+    if p.bump != 0:
+        n = p.bump_passes
+        u = n * (m - p.bump_output * o - p.bump_at)
+        value, slope = 0.0, 0.0
+        if p.bump_form > 0:
+            kappa = 1.0 / (n * p.bump_width) ** 2
+            value = math.exp(kappa * (math.cos(u) - 1.0))
+            slope = -n * kappa * math.sin(u) * value
+        else:
+            # A lopsided raised cosine: a steep entry, a longer way out.
+            u = (u - 2 * math.pi * round(u / (2 * math.pi))) / n / (1.6 * p.bump_width)
+            if abs(u) < 1.0:
+                value = 0.5 * (1 + math.cos(math.pi * u)) * (1 + 0.4 * u)
+                slope = 0.2 * (1 + math.cos(math.pi * u)) - 0.5 * math.pi * math.sin(math.pi * u) * (
+                    1 + 0.4 * u
+                )
+                slope /= 1.6 * p.bump_width
+        e += p.bump * value
+        by_m += p.bump * slope
+        by_o -= p.bump_output * p.bump * slope
+    return e, by_m, by_o
+
+
+@njit(cache=True)
+def spring_torque(d, table, reach, p):
+    """The gap takes its width first, then the table of the springs in series; a cubic is parallel."""
+    torque = 0.0
+    if p.cubic > 0:
+        if p.cubic_form > 0:
+            torque = p.cubic * d * d * d
+        else:
+            # 6 s^3 (sinh(d/s) - d/s) = d^3 + d^5/(20 s^2) + ...
+            torque = 6 * p.cubic * p.cubic_scale**3 * (math.sinh(d / p.cubic_scale) - d / p.cubic_scale)
+    if p.gap > 0:
+        half = 0.5 * p.gap
+        if p.gap_rounding > 0:
+            s = p.gap_rounding * p.gap
+            d += 0.5 * (math.sqrt((d - half) ** 2 + s * s) - math.sqrt((d + half) ** 2 + s * s))
+        else:
+            d = math.copysign(max(0.0, abs(d) - half), d)
+    place = (d / reach + 1.0) * 0.5 * (len(table) - 1)
+    k = min(max(int(place), 0), len(table) - 2)
+    return torque + table[k] + (place - k) * (table[k + 1] - table[k])
+
+
+@njit(cache=True)
+def bristle_after(z, speed, s, p):
+    """Bristle deflection after the time ``s`` at a speed, and the rate at which it relaxes."""
+    if p.bristle_form > 0:
+        fall = math.exp(-((speed / p.bristle_speed) ** 2))
     else:
-        t = p[T2] + p[K3] * (size - d2)
-    return sign * (t + p[CUBIC] * size**3)
+        fall = math.exp(-abs(speed / p.bristle_speed))
+    level = p.bristle_coulomb + (p.bristle_static - p.bristle_coulomb) * fall
+    rate = p.bristle * abs(speed) / level
+    if rate * s < 1e-9:
+        return z + speed * s, rate
+    decay = math.exp(-rate * s)
+    return z * decay + speed * (1.0 - decay) / rate, rate
 
 
 @njit(cache=True)
-def rates(t, y, torque, load, p, dy, out):
-    """y: motor angle, speed, output angle, speed, bristle, slider forces."""
-    m, wm, o, wo, z = y[0], y[1], y[2], y[3], y[4]
-    e = p[KE_AMPLITUDE] * math.sin(p[KE_ORDER] * m + p[KE_PHASE])
-    de = p[KE_AMPLITUDE] * p[KE_ORDER] * math.cos(p[KE_ORDER] * m + p[KE_PHASE])
-    e += p[KE_AMPLITUDE2] * math.sin(p[KE_ORDER2] * (m - o) + 0.7)
-    de += p[KE_AMPLITUDE2] * p[KE_ORDER2] * math.cos(p[KE_ORDER2] * (m - o) + 0.7)
-    e += p[WG_ONCE] * math.sin(m + 0.4)
-    de += p[WG_ONCE] * math.cos(m + 0.4)
-    twist = m / RATIO + e - o
-    rate = wm * (1.0 / RATIO + de) - wo
-    tau = spring_torque(twist, p) + p[DAMPING] * rate
-    if p[MAXWELL_TORQUE] > 0:
+def load_at(o, p):
+    """Torque of the load that is a function of the output angle."""
+    load = p.arm * math.sin(o) + p.weight * math.cos(o + p.weight_phase)
+    load += p.cable * math.tanh((o - p.cable_at) / p.cable_width) ** 3
+    load += p.catch * math.exp(-(((o - p.catch_at) / p.catch_width) ** 2))
+    return load + p.cogging * math.sin(p.cogging_order * o + 0.5)
+
+
+@njit(cache=True)
+def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
+    """The state: motor angle, speed; output; housing; mounted mass (each so); Duhem torque; temperature.
+
+    ``s`` is the time since the step began; bristles and sliders are solved exactly within a step.
+    """
+    m, wm, o, wo, b, wb = y[0], y[1], y[2], y[3], y[4], y[5]
+    e, by_m, by_o = error_of(m, o, p)
+    housing = 1.0 - 1.0 / p.ratio
+    twist = m / p.ratio + e - o + housing * b
+    rate = wm * (1.0 / p.ratio + by_m) + wo * (by_o - 1.0) + housing * wb
+    tau = spring_torque(twist, table, reach, p) + p.damping * rate
+    if p.maxwell > 0:
         for k in range(SLIDERS):
-            # Slip limits and slip twists that grow linearly over the elements.
-            share = p[MAXWELL_TORQUE] * 2.0 * (k + 1) / (SLIDERS * (SLIDERS + 1))
-            reach = p[MAXWELL_SCALE] * (k + 1) / SLIDERS
-            force = y[5 + k]
-            tau += force
-            stiffness = share / reach
-            if (force >= share and rate > 0) or (force <= -share and rate < 0):
-                dy[5 + k] = 200.0 * (share * (1.0 if force > 0 else -1.0) - force)
-            else:
-                dy[5 + k] = stiffness * rate
-    # Friction at the motor: sign(w) as w / sqrt(w^2 + w0^2).
-    sign = wm / math.sqrt(wm * wm + 0.09)
-    friction = (p[COULOMB] + p[LOAD_LOSS] * abs(tau / RATIO)) * sign + p[VISCOUS] * wm * (
-        1.0 + p[THERMAL_RATE] * math.exp(-t / 4.0)
-    )
-    if p[STRIBECK_EXTRA] > 0:
+            share, far = slider(k, p)
+            tau += min(share, max(-share, sliders[k] + share / far * (twist - twist0)))
+    dy[8] = 0.0
+    if p.duhem > 0:
+        z = y[8]
+        tau += z
+        fill = abs(z / p.duhem) ** p.duhem_power * math.copysign(1.0, z)
+        dy[8] = p.duhem_stiffness * (rate - abs(rate) * fill)
+    sign = sign_of(wm, p.sign_speed, p.algebraic_sign)
+    carried = abs(tau / p.ratio)
+    viscous = p.viscous * wm
+    if p.thermal > 0:
+        if p.thermal_form > 0:
+            viscous *= math.exp(-p.thermal * (y[9] - 20.0))
+        else:
+            # Andrade's law of the absolute temperature.
+            viscous *= math.exp(p.thermal * 293.15**2 * (1.0 / (y[9] + 273.15) - 1.0 / 293.15))
+    friction = (p.coulomb + p.load_loss * carried) * sign + viscous
+    if p.stribeck > 0:
+        over = wm / p.stribeck_speed
         # Hess and Soom's form instead of the Gaussian.
-        friction += p[STRIBECK_EXTRA] * sign / (1.0 + (wm / p[STRIBECK_SPEED]) ** 2)
-    if p[LUGRE_STATIC] > 0:
-        # In place of the Coulomb friction: Canudas de Wit's bristle with exp(-|w/v|).
-        friction -= p[COULOMB] * sign
-        level = p[COULOMB] + (p[LUGRE_STATIC] - p[COULOMB]) * math.exp(-abs(wm / p[LUGRE_SPEED]))
-        dz = wm - p[LUGRE_STIFFNESS] * abs(wm) / level * z
-        dy[4] = dz
-        friction += p[LUGRE_STIFFNESS] * z
-    ripple = p[RIPPLE_TORQUE] * math.sin(p[RIPPLE_ORDER] * m + p[RIPPLE_PHASE])
-    # Outside the catalogue: a cable loop that winds up, and a kick from a spring catch.
-    cable = p[CABLE] * math.tanh(3.0 * (o - 0.15)) ** 3
-    kick = p[SPRING_KICK] * math.exp(-(((o - 0.25) / 0.05) ** 2))
-    drift = p[DRIFT] * math.sin(2 * math.pi * t / 5.3) * math.exp(-t / 9.0)
-    out_sign = wo / math.sqrt(wo * wo + 1e-5)
-    out_friction = p[LOAD_COULOMB] * out_sign + p[LOAD_VISCOUS] * wo
-    weight = p[ARM] * math.sin(o) + p[UNBALANCE] * math.cos(o + p[UNBALANCE_PHASE])
-    reaction = tau * (1.0 / RATIO + de)
+        friction += (
+            p.stribeck * sign * (math.exp(-over * over) if p.stribeck_form > 0 else 1 / (1 + over * over))
+        )
+    if p.bristle > 0:
+        z, relax = bristle_after(bristle, wm, s, p)
+        friction += p.bristle * z
+        fading = wm / p.bristle_speed
+        friction += p.bristle_damping * math.exp(-fading * fading) * (wm - relax * z)
+    friction += p.extra_coulomb * sign + p.extra_viscous * math.copysign(abs(wm) ** p.extra_power, wm)
+    if p.extra_loss > 0:
+        if p.loss_form > 0:
+            level = math.sqrt(tau * tau + 0.25) - 0.5
+            friction += p.extra_loss * level / abs(p.ratio) * math.tanh(wm / 0.5)
+        else:
+            friction += p.extra_loss * carried * (carried / p.loss_scale) ** (p.loss_power - 1.0) * sign
+    friction += p.churn * wm * abs(wm)
+    friction += p.zone * sign * math.exp(-(((o - p.zone_at) / p.zone_width) ** 2))
+    if p.brake > 0:
+        friction += p.brake * sign * 0.5 * (math.tanh((t - 4.0) / 0.05) - math.tanh((t - 6.5) / 0.05))
+    drive = torque + p.ripple_a * math.sin(p.ripple_a_order * m + p.ripple_a_phase)
+    drive += p.ripple_b * math.sin(p.ripple_b_order * m + p.ripple_b_phase)
+    drive += p.ripple_c * math.sin(p.ripple_c_order * m + p.ripple_c_phase)
+    drive -= p.motor_weight * math.cos(m + p.motor_weight_phase)
+    drive += p.drift * math.sin(2 * math.pi * t / 5.3) * math.exp(-t / 9.0)
+    load = load_at(o, p)
+    load += p.load_coulomb * sign_of(wo, p.load_sign_speed, 1.0 - p.load_form) + p.load_viscous * wo
+    dy[6], dy[7] = y[7], 0.0
+    if p.absorber > 0:
+        pull = p.absorber * (y[6] - o) + 0.04 * math.sqrt(p.absorber * p.absorber_inertia) * (y[7] - wo)
+        load -= pull
+        dy[7] = -pull / p.absorber_inertia
     dy[0] = wm
-    dy[1] = (torque + ripple + drift - friction - reaction) / p[MOTOR_INERTIA]
+    dy[1] = (drive - friction - tau * (1.0 / p.ratio + by_m)) / p.motor_inertia
     dy[2] = wo
-    dy[3] = (tau - weight - out_friction - cable - kick + load) / p[LOAD_INERTIA]
-    if p[OUTPUT_LOCKED] > 0:
+    dy[3] = (tau * (1.0 - by_o) - load) / p.load_inertia
+    if p.locked > 0:
         dy[2] = dy[3] = 0.0
-    out[0] = tau
+    dy[4] = dy[5] = 0.0
+    if p.mount > 0:
+        dy[4] = wb
+        dy[5] = (-housing * tau - b / p.mount - p.mount_damping * wb) / p.mount_inertia
+    heat = friction * wm + p.damping * rate * rate
+    dy[9] = (heat - (y[9] - 20.0) / p.thermal_resistance) / p.heat_capacity
+    out[0], out[1] = tau, twist
 
 
 @njit(cache=True)
-def integrate(reference, speed, p, log):
-    """Fourth-order Runge-Kutta; the controller runs at the log's rate and holds its torque."""
-    n = len(reference)
-    y = np.zeros(5 + SLIDERS)
-    a, b, c, d = np.zeros_like(y), np.zeros_like(y), np.zeros_like(y), np.zeros_like(y)
-    out = np.zeros(1)
-    y[0] = RATIO * reference[0]
-    y[1] = RATIO * speed[0]
-    y[3] = speed[0]
-    y[2] = reference[0]
-    integral = 0.0
-    steps = round(1.0 / (RATE * STEP))
-    for k in range(n):
-        wanted = RATIO * speed[k] + 25.0 * (RATIO * reference[k] - y[0])
-        error = wanted - y[1]
-        integral = min(0.5, max(-0.5, integral + 0.8 * error / RATE))
-        torque = min(2.0, max(-2.0, 0.02 * error + integral))
-        rates(k / RATE, y, torque, 0.0, p, a, out)
-        log[k, 0], log[k, 1], log[k, 2], log[k, 3] = y[0], torque, y[2], out[0]
-        for j in range(steps):
-            t = k / RATE + j * STEP
-            rates(t, y, torque, 0.0, p, a, out)
-            rates(t + STEP / 2, y + STEP / 2 * a, torque, 0.0, p, b, out)
-            rates(t + STEP / 2, y + STEP / 2 * b, torque, 0.0, p, c, out)
-            rates(t + STEP, y + STEP * c, torque, 0.0, p, d, out)
-            y = y + STEP / 6 * (a + 2 * b + 2 * c + d)
+def slider(k, p):
+    """Slip torque and slip twist of a slider: twelve that grow linearly, or three equal ones."""
+    if p.maxwell_form > 0:
+        if k > 2:
+            return 0.0, 1.0
+        return p.maxwell / 3.0, (1e-4, 3e-4, 8e-4)[k]
+    return p.maxwell * 2.0 * (k + 1) / (SLIDERS * (SLIDERS + 1)), p.maxwell_reach * (k + 1) / SLIDERS
 
 
-@dataclass(frozen=True)
-class Sensors:
-    """What the log reads: counts per turn, noise, clock jitter, spikes."""
-
-    motor_counts: float = 65536.0
-    output_counts: float = 2.0**22
-    motor_noise: float = 2e-5  # rad
-    output_noise: float = 4e-6  # rad
-    motor_torque_noise: float = 6e-3  # N m
-    output_torque_noise: float = 0.15  # N m
-    jitter: float = 0.0  # s
-    spikes: int = 0
-
-
-@dataclass(frozen=True)
-class Case:
-    """A plant, its sensors and what is true of it."""
-
-    truth: str
-    changes: dict[str, float] = field(default_factory=dict)
-    sensors: Sensors = field(default_factory=Sensors)
-    seconds: float = 12.0
-    seed: int = 0
-    channels: tuple[str, ...] = ("motor_angle", "motor_torque", "output_angle", "output_torque")
+@njit(cache=True)
+def motor_at(motion, k, share, y):
+    """Put the prescribed motor angle and speed into a state: cubic Hermite between two ticks."""
+    last = min(k + 1, len(motion) - 1)
+    h, s = 1.0 / CONTROL_RATE, share
+    m0, v0, m1, v1 = motion[k, 0], h * motion[k, 1], motion[last, 0], h * motion[last, 1]
+    c2, c3 = 3 * (m1 - m0) - 2 * v0 - v1, 2 * (m0 - m1) + v0 + v1
+    if last == k:
+        c2, c3 = 0.0, 0.0
+    y[0] = m0 + s * (v0 + s * (c2 + s * c3))
+    y[1] = (v0 + s * (2 * c2 + 3 * s * c3)) / h
 
 
-def reference(seconds: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Angle and speed at the output: a slow and a fast swing, both directions, all speeds."""
-    rng = np.random.default_rng([seed, 11])
-    t = np.arange(round(seconds * RATE)) / RATE
-    f1, f2 = 0.11 * rng.uniform(0.9, 1.1), 0.53 * rng.uniform(0.9, 1.1)
-    a1, a2 = 0.9, 0.12
-    angle = a1 * np.sin(2 * np.pi * f1 * t) + a2 * (1 - np.cos(2 * np.pi * f2 * t))
-    speed = a1 * 2 * np.pi * f1 * np.cos(2 * np.pi * f1 * t) + a2 * 2 * np.pi * f2 * np.sin(
-        2 * np.pi * f2 * t
-    )
-    return angle, speed
+@njit(cache=True)
+def integrate(angle, speed, motion, start, p, table, reach, gains, log):
+    """Fourth-order Runge-Kutta; the controller holds its torque for a period.
+
+    With a ``motion`` (motor angle, speed and acceleration at every tick) the motor follows it instead, and
+    the torque is what that takes.
+    """
+    y, y1 = np.zeros(10), np.zeros(10)
+    a, b, c, d = np.zeros(10), np.zeros(10), np.zeros(10), np.zeros(10)
+    out, sliders, bristle, integral = np.zeros(2), np.zeros(SLIDERS), 0.0, start[2]
+    y[0], y[1] = p.ratio * angle[0], p.ratio * speed[0]
+    y[2], y[3] = start[0], (1.0 - p.locked) * speed[0]
+    y[4], y[6], y[7], y[9] = start[1], y[2], y[3], 20.0
+    rates(0.0, 0.0, y, 0.0, p, table, reach, bristle, sliders, 0.0, a, out)
+    twist0, h = out[1], STEP
+    for k in range(len(angle)):
+        error = p.ratio * speed[k] + gains[2] * (p.ratio * angle[k] - y[0]) - y[1]
+        integral = min(gains[3], max(-gains[3], integral + gains[1] * error / CONTROL_RATE))
+        torque = min(4 * gains[3], max(-4 * gains[3], gains[0] * error + integral))
+        t = k / CONTROL_RATE
+        if motion.shape[0] > 0:
+            motor_at(motion, k, 0.0, y)
+            rates(t, 0.0, y, 0.0, p, table, reach, bristle, sliders, twist0, a, out)
+            torque = (motion[k, 2] - a[1]) * p.motor_inertia
+        rates(t, 0.0, y, torque, p, table, reach, bristle, sliders, twist0, a, out)
+        log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = y[0], torque, y[2], out[0], y[9]
+        log[k, 5], log[k, 6] = y[1], a[1]
+        for i in range(STEPS):
+            if motion.shape[0] > 0:
+                # The first stage's motor is that of the Hermite curve, as are the others'.
+                motor_at(motion, k, i / STEPS, y)
+            rates(t, 0.0, y, torque, p, table, reach, bristle, sliders, twist0, a, out)
+            y1[:] = y + h / 2 * a
+            if motion.shape[0] > 0:
+                motor_at(motion, k, (i + 0.5) / STEPS, y1)
+            rates(t, h / 2, y1, torque, p, table, reach, bristle, sliders, twist0, b, out)
+            y1[:] = y + h / 2 * b
+            if motion.shape[0] > 0:
+                motor_at(motion, k, (i + 0.5) / STEPS, y1)
+            rates(t, h / 2, y1, torque, p, table, reach, bristle, sliders, twist0, c, out)
+            y1[:] = y + h * c
+            if motion.shape[0] > 0:
+                motor_at(motion, k, (i + 1.0) / STEPS, y1)
+            rates(t, h, y1, torque, p, table, reach, bristle, sliders, twist0, d, out)
+            middle = 0.5 * y[1]
+            y += h / 6 * (a + 2 * b + 2 * c + d)
+            if motion.shape[0] > 0:
+                motor_at(motion, k, (i + 1.0) / STEPS, y)
+            middle += 0.5 * y[1]
+            if p.bristle > 0:
+                bristle, _ = bristle_after(bristle, middle, h, p)
+            if p.maxwell > 0:
+                rates(t, 0.0, y, torque, p, table, reach, bristle, sliders, twist0, a, out)
+                for j in range(SLIDERS):
+                    share, far = slider(j, p)
+                    sliders[j] = min(share, max(-share, sliders[j] + share / far * (out[1] - twist0)))
+                twist0 = out[1]
+            t += h
 
 
-def truth(case: Case) -> np.ndarray:
-    """Motor angle, motor torque, output angle, output torque without sensors, shape (n, 4)."""
-    p = np.zeros(len(NAMES))
-    for name, value in (NOMINAL | case.changes).items():
-        p[AT[name]] = value
-    angle, speed = reference(case.seconds, case.seed)
-    log = np.zeros((len(angle), 4))
-    integrate(angle, speed, p, log)
+def spring_table(p: Numbers) -> tuple[np.ndarray, float]:
+    """Torque over twist of all compliances in series, and the twist at the table's end."""
+    top = 6.0 * p.t2
+    torque = np.concatenate([np.linspace(0.0, 0.05 * top, 20000), np.linspace(0.05 * top, top, 20000)[1:]])
+    d1, d2 = p.t1 / p.k1, p.t1 / p.k1 + (p.t2 - p.t1) / p.k2
+    far = d2 + (top - p.t2) / p.k3
+    twist = np.interp(torque, [0.0, p.t1, p.t2, top], [0.0, d1, d2, far])
+    if p.flexspline > 0:
+        scaled = p.flexspline_coefficient * torque
+        if p.flexspline_form > 0:
+            twist = twist + p.flexspline / p.flexspline_coefficient * np.arctan(scaled)
+        else:
+            twist = twist + p.flexspline * torque / np.sqrt(1.0 + scaled**2)
+    if p.generator > 0:
+        # At the wave generator the compliance is that at the output times the ratio squared.
+        scaled = p.generator_coefficient * torque / abs(p.ratio)
+        shape = -np.expm1(-scaled) if p.generator_form > 0 else scaled / (1.0 + scaled)
+        twist = twist + p.generator * abs(p.ratio) / p.generator_coefficient * shape
+    if p.mount > 0 and p.mount_inertia == 0:
+        twist = twist + (1.0 - 1.0 / p.ratio) ** 2 * p.mount * torque
+    reach = float(twist[-1])
+    half = np.interp(np.linspace(0.0, reach, TABLE // 2 + 1), twist, torque)
+    return np.concatenate([-half[:0:-1], half]), reach
+
+
+def balance(p: Numbers, angle: float, table: np.ndarray, reach: float) -> np.ndarray:
+    """Output angle, housing angle and motor torque at rest under the load, where the log begins."""
+    if p.locked:
+        return np.zeros(3)
+    motor, output, housing = p.ratio * angle, angle, 0.0
+    for _ in range(30):
+        load = load_at(output, p)
+        low, high = -reach, reach
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if spring_torque(middle, table, reach, p) < load else (low, middle)
+        housing = -(1.0 - 1.0 / p.ratio) * load * p.mount
+        error, by_m, _ = error_of(motor, output, p)
+        output = motor / p.ratio + error + (1.0 - 1.0 / p.ratio) * housing - 0.5 * (low + high)
+    return np.array([output, housing, load * (1.0 / p.ratio + by_m)])
+
+
+def simulate(
+    p: Numbers, angle: np.ndarray, speed: np.ndarray, motion: np.ndarray | None = None
+) -> np.ndarray:
+    """Motor angle and torque, output angle and torque, temperature, motor speed and acceleration.
+
+    Args:
+        p: the plant.
+        angle: reference at the output, rad, shape (n,) at the controller's rate.
+        speed: its derivative.
+        motion: motor angle, speed and acceleration that are prescribed instead of controlled, shape (n, 3).
+
+    Returns:
+        What is true, without sensors, shape (n, 7).
+    """
+    table, reach = spring_table(p)
+    inertia = p.motor_inertia + (0.0 if p.locked else p.load_inertia / p.ratio**2)
+    # Against a locked output the position loop has to beat the spring.
+    gain, place = (600.0 * inertia, 60.0) if p.locked else (170.0 * inertia, 25.0)
+    limit = 2.0 * p.t2 / abs(p.ratio)
+    log = np.zeros((len(angle), 7))
+    if p.mount > 0 and p.mount_inertia == 0:
+        p = p._replace(mount=0.0)
+    given = np.zeros((0, 3)) if motion is None else np.ascontiguousarray(motion)
+    start = balance(p, float(angle[0]), table, reach)
+    integrate(angle, speed, given, start, p, table, reach, np.array([gain, 40 * gain, place, limit]), log)
+    if not np.all(np.isfinite(log)):
+        raise FloatingPointError("the plant has run away")
     return log
-
-
-def run(case: Case) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Time and the measured channels of a case."""
-    log = truth(case)
-    changes, s = NOMINAL | case.changes, case.sensors
-    rng = np.random.default_rng([case.seed, 7])
-    n = len(log)
-    time = np.arange(n) / RATE
-    motor, torque, output, out_torque = log.T.copy()
-    if delay := changes.get("delay", 0.0):
-        output = np.interp(time - delay, time, output)
-    output = output + changes.get("encoder_once", 0.0) * np.sin(output + changes.get("encoder_phase", 0.0))
-    if changes.get("sensor_ripple"):
-        out_torque = out_torque + changes["sensor_ripple"] * np.sin(changes["sensor_order"] * motor + 1.1)
-    motor = _counted(motor + s.motor_noise * rng.standard_normal(n), s.motor_counts)
-    output = _counted(output + s.output_noise * rng.standard_normal(n), s.output_counts)
-    torque = changes["gain"] * torque + s.motor_torque_noise * rng.standard_normal(n)
-    out_torque = out_torque + s.output_torque_noise * rng.standard_normal(n) + 0.2
-    if s.spikes:
-        where = rng.choice(n, s.spikes, replace=False)
-        torque[where] += rng.choice([-1.0, 1.0], s.spikes) * 1.5
-    if s.jitter:
-        time = time + s.jitter * rng.uniform(-1, 1, n)
-        time[0] = 0.0
-    channels = {
-        "motor_angle": motor, "motor_torque": torque, "output_angle": output, "output_torque": out_torque,
-    }  # fmt: skip
-    return time, {name: channels[name] for name in case.channels}
-
-
-def _counted(angle: np.ndarray, counts: float) -> np.ndarray:
-    step = 2 * np.pi / counts
-    return np.round(angle / step) * step
