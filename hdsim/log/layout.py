@@ -8,33 +8,28 @@ The format is the layout export of Foxglove and Lichtblick: panels by id, a tree
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hdsim.errors import InputError
+from hdsim.log.panels import Panel, Split, column, events, gauge, lamp, plot, row, scene
 
 STATE = "/hd/state_view"
 TEETH = "/hd/teeth"
 MEASURED = "/hd/measured_view"
 LOOP = "/hd/state_loop"
 STATIC = "/hd/static_view"
-EVENTS = "/hd/events"
-SCENE = "/hd/scene"
-SCENE_STATIC = "/hd/scene_static"
 
 Topics = Mapping[str, Collection[str]]
 """Fields of every topic of a log, by topic."""
 
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 _SHORT_S, _LONG_S = 10.0, 60.0
-_LEGEND_MARGIN_PX, _LETTER_PX = 80, 10
-"""Width of a legend: more than its text takes, because the viewer narrows it in favour of the plot."""
 _NOW_STYLE = {"color": "#ff3b30", "lineSize": 2.0}
 _CURVE_STYLE = {"color": "#4e98e2", "lineSize": 0.8}
+_AFTER_STYLE, _BEFORE_STYLE, _MEASURED_STYLE = ({"color": c} for c in ("#128a3c", "#f5774d", "#7fa8d8"))
 _CAMERA_DISTANCE = 5.0
 """Of the camera from the drive, in pitch radii."""
 
@@ -49,145 +44,6 @@ def playback_speed(duration: float) -> float:
     if duration < _SHORT_S:
         return max((s for s in _SPEEDS if duration / s >= _SHORT_S), default=_SPEEDS[0])
     return min((s for s in _SPEEDS if s >= 1 and duration / s <= _LONG_S), default=_SPEEDS[-1])
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A panel: its type and title, its settings, and the message paths that it draws."""
-
-    kind: str
-    title: str
-    settings: Mapping[str, Any]
-    paths: tuple[str, ...] = ()
-
-    @property
-    def id(self) -> str:
-        """Name in the layout."""
-        return f"{self.kind}!{re.sub('[^a-z0-9]+', '_', self.title.split('[')[0].lower()).strip('_')}"
-
-
-@dataclass(frozen=True)
-class Split:
-    """Parts side by side (``row``) or over each other (``column``), with their shares of the room."""
-
-    direction: str
-    parts: tuple[tuple[float, Panel | Split], ...]
-
-
-def row(*parts: tuple[float, Panel | Split]) -> Split:
-    """Parts side by side."""
-    return Split("row", parts)
-
-
-def column(*parts: tuple[float, Panel | Split]) -> Split:
-    """Parts over each other."""
-    return Split("column", parts)
-
-
-def plot(title: str, *paths: str, over: str | None = None, dots: bool = False, legend: bool = True) -> Panel:
-    """Values over time; with ``over``, arrays over another of the message, or over ``index``."""
-    labels = _labels(paths)
-    lines = [
-        {
-            "value": path,
-            "enabled": True,
-            "timestampMethod": "receiveTime",
-            "label": label,
-            "showLine": not dots,
-        }
-        for path, label in zip(paths, labels, strict=True)
-    ]
-    settings: dict[str, Any] = {
-        "paths": lines,
-        "showLegend": True,
-        "legendDisplay": "left" if legend and len(paths) > 1 else "none",
-        "showPlotValuesInLegend": False,
-        "showXAxisLabels": True,
-        "showYAxisLabels": True,
-        "isSynced": over is None,
-        "xAxisVal": "timestamp" if over is None else "index" if over == "index" else "currentCustom",
-        "sidebarDimension": _LEGEND_MARGIN_PX + _LETTER_PX * max(map(len, labels)),
-    }
-    drawn = paths
-    if over not in (None, "index"):
-        settings["xAxisPath"] = {"value": over, "enabled": True}
-        drawn = (*paths, str(over))
-    return Panel("Plot", title, settings, drawn)
-
-
-def _labels(paths: tuple[str, ...]) -> list[str]:
-    """What tells the lines of a plot from each other: topics, indexes, or what their fields don't share."""
-    split = [path.partition(".")[::2] for path in paths]
-    names = [re.sub(r"(_arcsec|_um)?(\[:\])?$", "", field) for _, field in split]
-    if len(paths) > 1 and len(set(names)) == 1:
-        return [topic.removeprefix("/hd/").removesuffix("_view") for topic, _ in split]
-    found = [name.partition("[") for name in names]
-    if all(index for *_, index in found):
-        return [f"no. {index.removesuffix(']')}" for *_, index in found]
-    # The title names the quantity: of motor_torque and load_torque motor and load are left.
-    last = {name.rpartition("_")[2] for name in names}
-    return [name.rpartition("_")[0] if len(paths) > 1 and len(last) == 1 else name for name in names]
-
-
-def scene(title: str = "Drive") -> Panel:
-    """The three-dimensional scene, seen along the axis."""
-    settings = {
-        "cameraState": {
-            "perspective": False,
-            "phi": 0,
-            "thetaOffset": 0,
-            "targetOffset": [0, 0, 0],
-            "target": [0, 0, 0],
-            "targetOrientation": [0, 0, 0, 1],
-            "fovy": 45,
-            "near": 0.001,
-            "far": 10,
-        },
-        "followMode": "follow-none",
-        "followTf": "world",
-        "scene": {
-            "backgroundColor": "#111318",
-            "transforms": {"axisScale": 0, "showLabel": False, "visible": False},
-        },
-        "transforms": {},
-        "topics": {SCENE: {"visible": True}, SCENE_STATIC: {"visible": True}},
-        "layers": {},
-        "publish": {},
-        "imageMode": {},
-    }
-    return Panel("3D", title, settings, (SCENE, SCENE_STATIC))
-
-
-def gauge(title: str, path: str, low: float, high: float) -> Panel:
-    """One number as a needle."""
-    settings = {
-        "path": path,
-        "minValue": low,
-        "maxValue": high,
-        "colorMap": "red-yellow-green",
-        "colorMode": "colormap",
-        "gradient": ["#0000ff", "#ff00ff"],
-        "reverse": False,
-    }
-    return Panel("Gauge", title, settings, (path,))
-
-
-def lamp(title: str, path: str, below: float, text: str, otherwise: str) -> Panel:
-    """A field that turns red with ``text`` while a number is below a limit."""
-    settings = {
-        "path": path,
-        "style": "background",
-        "fallbackColor": "#339933",
-        "fallbackLabel": otherwise,
-        "rules": [{"operator": "<", "rawValue": str(below), "color": "#ee2222", "label": text}],
-    }
-    return Panel("Indicator", title, settings, (path,))
-
-
-def events(title: str = "Events") -> Panel:
-    """The events as they come."""
-    settings = {"searchTerms": [], "minLogLevel": 1, "topicToRender": EVENTS, "nameFilter": {}}
-    return Panel("RosOut", title, settings, (EVENTS,))
 
 
 def _motion() -> Panel:
@@ -208,17 +64,14 @@ def _profile() -> Panel:
 
 
 def _loop() -> Panel:
-    panel = plot(
+    return plot(
         "Torque [N m] over twist [arcsec], red: now",
         f"{LOOP}.output_torque_now[:]",
         f"{LOOP}.output_torque[:]",
         over=f"{LOOP}.twist_arcsec[:]",
         legend=False,
+        styles=(_NOW_STYLE, _CURVE_STYLE),
     )
-    # The viewer draws the first line over the second.
-    for line, style in zip(panel.settings["paths"], (_NOW_STYLE, _CURVE_STYLE), strict=True):
-        line.update(style)
-    return panel
 
 
 def _contact_lamp() -> Panel:
@@ -288,7 +141,9 @@ def diagnose() -> Split:
     """A measured run, and the model before and after an effect was added to it."""
 
     def three(title: str, channel: str) -> Panel:
-        return plot(title, *(f"/hd/{run}_view.{channel}" for run in ("measured", "before", "after")))
+        # What was measured lies lowest: with its noise it would hide the others.
+        paths = [f"/hd/{run}_view.{channel}" for run in ("after", "before", "measured")]
+        return plot(title, *paths, styles=(_AFTER_STYLE, _BEFORE_STYLE, _MEASURED_STYLE))
 
     return row(
         (

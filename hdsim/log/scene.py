@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
-from hdsim.log import layout, naming, schemas, shapes
+from hdsim.log import layout, naming, panels, schemas, shapes
 from hdsim.log.shapes import Array
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ class SceneWriter:
         payloads = [
             self._teeth_frame(at, m, a, f) for at, m, a, f in zip(times, motor, angle, force, strict=True)
         ]
-        self._log.write_messages(layout.SCENE, "foxglove.SceneUpdate", _scene_schema, times, payloads)
+        self._log.write_messages(panels.SCENE, "foxglove.SceneUpdate", _scene_schema, times, payloads)
 
     def _teeth_frame(self, at: int, motor: float, angle: Array, force: Array) -> bytes:
         """One frame: idle teeth grey, engaged ones coloured, with a bar inwards as long as the force."""
@@ -238,7 +238,7 @@ class SceneWriter:
         has_error = any(c in state for c in _ERROR_CHANNELS)
         update = SceneUpdate(entities=static_entities(self._geometry, at, with_error=has_error))
         self._log.write_messages(
-            layout.SCENE_STATIC,
+            panels.SCENE_STATIC,
             "foxglove.SceneUpdate",
             _scene_schema,
             [at],

@@ -119,7 +119,7 @@ def test_lines_are_told_apart_by_what_differs():
     def labels(name, panel):
         return [line["label"] for line in layout.build_layout(name)["configById"][panel]["paths"]]
 
-    assert labels("diagnose", "Plot!output_torque") == ["measured", "before", "after"]
+    assert labels("diagnose", "Plot!output_torque") == ["after", "before", "measured"]
     assert labels("overview", "Plot!error") == ["tracking", "transmission"]
     assert labels("overview", "Plot!motor_torque") == ["motor", "input_friction"]
     assert labels("tooth-contact", "Plot!force_of_three_teeth_over_time") == ["no. 0", "no. 5", "no. 10"]

@@ -12,7 +12,18 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.reader import make_reader
 
 from hdsim.errors import InputError
-from hdsim.log import LogWriter, info_log, layout, naming, open_log, scene, shapes, verify_log, write_log
+from hdsim.log import (
+    LogWriter,
+    info_log,
+    layout,
+    naming,
+    open_log,
+    panels,
+    scene,
+    shapes,
+    verify_log,
+    write_log,
+)
 from hdsim.recording import Column, Table
 
 
@@ -59,7 +70,7 @@ def test_frames_come_at_the_rate_that_playback_shows_and_turn_the_bodies(log):
 def test_teeth_lie_on_the_ellipse_that_follows_the_wave_generator(log):
     run = drive_run()
     g = scene.geometry_of(run)
-    frames = messages(log, layout.SCENE, SceneUpdate)
+    frames = messages(log, panels.SCENE, SceneUpdate)
     teeth = run.tables["teeth"]
     assert len(frames) > 30
     for log_time, update in frames[3 :: len(frames) // 5]:
@@ -80,7 +91,7 @@ def test_teeth_lie_on_the_ellipse_that_follows_the_wave_generator(log):
 def test_engaged_teeth_are_coloured_by_their_force(log):
     teeth = drive_run().tables["teeth"]
     largest = np.abs(teeth["normal_force"]).max()
-    for log_time, update in messages(log, layout.SCENE, SceneUpdate)[::20]:
+    for log_time, update in messages(log, panels.SCENE, SceneUpdate)[::20]:
         k = int(np.flatnonzero(naming.to_ns(teeth.time) == log_time)[0])
         share = teeth["normal_force"][k] / largest
         engaged = share[share > 1e-3]
@@ -98,7 +109,7 @@ def test_engaged_teeth_are_coloured_by_their_force(log):
 
 
 def test_bodies_and_legend_are_sent_once_on_a_topic_of_their_own(log):
-    ((log_time, update),) = messages(log, layout.SCENE_STATIC, SceneUpdate)
+    ((log_time, update),) = messages(log, panels.SCENE_STATIC, SceneUpdate)
     assert log_time == naming.EPOCH_NS
     frames = {e.id: e.frame_id for e in update.entities}
     assert frames == {
@@ -163,14 +174,14 @@ def test_the_scene_does_not_depend_on_how_the_run_is_cut(tmp_path, size, log):
             blocks = {name: cut(table, begin, end) for name, table in run.tables.items()}
             blocks = {name: block for name, block in blocks.items() if len(block)}
             drawing.write(blocks)
-    for topic, kind in ((layout.SCENE, SceneUpdate), (scene.TRANSFORM_TOPIC, FrameTransforms)):
+    for topic, kind in ((panels.SCENE, SceneUpdate), (scene.TRANSFORM_TOPIC, FrameTransforms)):
         assert messages(path, topic, kind) == messages(log, topic, kind)
 
 
 def test_without_tooth_forces_the_teeth_turn_with_the_flexspline(tmp_path):
     run = drive_run(duration=1.0)
     del run.tables["teeth"]
-    frames = messages(write_log(run, tmp_path / "a.mcap"), layout.SCENE, SceneUpdate)
+    frames = messages(write_log(run, tmp_path / "a.mcap"), panels.SCENE, SceneUpdate)
     assert len(frames) > 100
     first = frames[40][1].entities[0].lines[0].points[1]
     k = int(np.flatnonzero(naming.to_ns(run.time) == frames[40][0])[0])
@@ -196,7 +207,7 @@ def test_a_minute_at_a_kilohertz_with_teeth_and_scene_stays_small(tmp_path):
     run = drive_run(duration=60.0, rate=1000.0, teeth_every=20)
     path = write_log(run, tmp_path / "a.mcap")
     assert path.stat().st_size < 60e6
-    assert len(messages(path, layout.SCENE, SceneUpdate)) == pytest.approx(1800, abs=2)
+    assert len(messages(path, panels.SCENE, SceneUpdate)) == pytest.approx(1800, abs=2)
 
 
 def test_half_an_hour_is_drawn_in_at_most_3600_frames():
