@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import COEFFICIENT_PRIOR, Fit, trace
+from hdsim.diagnose.fit import COEFFICIENT_PRIOR, Fit
 from hdsim.diagnose.freedom import Added, State, scaled
 from hdsim.diagnose.further import CurveFound
 from hdsim.diagnose.locate import Location, coordinates, hats
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.penalised import UNSEEN, Penalised, penalised, roughness
 from hdsim.diagnose.screen import Residual
+from hdsim.diagnose.search import _left as left_of
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects.table import COORDINATE_UNITS, Acting, Coordinate, TableCurve, cells
 
@@ -148,9 +149,7 @@ def fit_curve(
     """
     bench.weigh(bench.residuals(fit.predictions))
     residuals = bench.residuals(fit.predictions)
-    numbers = bench.stacked_series()
-    offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
-    left = Residual(bench.stacked(residuals), np.hstack([fit.columns, offsets]), bench.stacked_blocks())
+    left = left_of(bench, fit)
     best: tuple[float, Kind, Array, Added, Array, Penalised] | None = None
     tried: dict[str, float] = {}
     for kind in kinds(bench, location):
@@ -349,7 +348,7 @@ def unit_traces(
         one = tuple(1.0 if j == k else 0.0 for j in range(len(at)))
         states.append(replace(fit.state, added=(*fit.state.added, replace(added, coefficients=one))))
     found = bench.predict_all(states)
-    columns = [trace(bench, fit.predictions, there) for there in found if there is not None]
+    columns = [bench.trace(fit.predictions, there) for there in found if there is not None]
     return np.column_stack(columns) if len(columns) == len(found) else None
 
 
@@ -376,8 +375,9 @@ def _solved(
     """The model with the curve, and the standard deviations of its coefficients.
 
     The traces stay those of the start (a chord method): a second step takes up what is not linear in them.
-    The standard deviations are those of the Bayesian view of the penalty, which cover the smoothing's bias
-    (Nychka 1988, J. American Statistical Association 83:1134), with blocks of time as independent samples.
+    The variances are the sum of two: that of the Bayesian view of the penalty, which covers the smoothing's
+    bias (Nychka 1988, J. American Statistical Association 83:1134), and the cluster-robust one over blocks of
+    time, which covers residuals that are correlated.
     """
     projected = left.project(columns)
     blocks = bench.stacked_blocks()
@@ -417,9 +417,8 @@ def _solved(
     used = np.unique(blocks)
     sums = np.array([(projected[blocks == b].T @ rest[blocks == b]) for b in used])
     meat = sums.T @ sums * len(used) / max(len(used) - columns.shape[1], 1)
-    bayes = float(np.mean(rest**2)) * found.inverse
-    clustered = found.inverse @ (meat + float(np.mean(rest**2)) * found.penalty) @ found.inverse
-    covariance = clustered + np.diag(np.maximum(np.diag(bayes) - np.diag(clustered), 0.0))
+    power = float(np.mean(rest**2))
+    covariance = found.inverse @ meat @ found.inverse + power * found.inverse
     p = fit.covariance.shape[0]
     both = np.zeros((p + len(covariance), p + len(covariance)))
     both[:p, :p], both[p:, p:] = fit.covariance, covariance
