@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from hdsim.log.reader import read_attachments as read_attachments
     from hdsim.log.recovery import RecoverReport as RecoverReport
     from hdsim.log.recovery import recover_log as recover_log
+    from hdsim.log.whole import write_log as write_log
     from hdsim.log.writer import LogWriter as LogWriter
-    from hdsim.log.writer import write_log as write_log
 
 _HOME = {
     "LogInfo": "info",
@@ -32,7 +32,7 @@ _HOME = {
     "read_attachments": "reader",
     "recover_log": "recovery",
     "verify_log": "check",
-    "write_log": "writer",
+    "write_log": "whole",
 }
 
 __all__ = sorted(_HOME)

@@ -307,7 +307,7 @@ def _column(name: str, values: Array) -> Column:
 
 def write_imported(recording: Recording, path: str | Path) -> Path:
     """Write an imported recording as a log, with its mapping attached."""
-    from hdsim.log.writer import write_log
+    from hdsim.log.whole import write_log
 
     files: dict[str, Any] = {}
     if "mapping" in recording.metadata:

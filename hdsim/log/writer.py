@@ -20,7 +20,7 @@ from hdsim.log.viewing import LoopStream, ViewStream, display_columns, scaled
 from hdsim.recording import Event, Table
 
 if TYPE_CHECKING:
-    from hdsim.recording import Column, Recording
+    from hdsim.recording import Column
 
     Array = naming.Array
 
@@ -378,43 +378,3 @@ class LogWriter:
         finally:
             self._file.close()
         os.replace(self.partial, self.path)
-
-
-def write_log(
-    recording: Recording,
-    path: str | Path,
-    *,
-    attachments: Mapping[str, bytes | str] | None = None,
-    scene: bool = True,
-) -> Path:
-    """Write a whole recording.
-
-    Args:
-        recording: what to write; arrays come back bit by bit from `hdsim.log.open_log`.
-        path: where to.
-        attachments: file names to contents. The text under ``scenario`` in the metadata is attached as
-            ``scenario.yaml`` unless there is an attachment of that name.
-        scene: draw the drive, if the state has the angles of motor and output.
-
-    Returns:
-        The log's path.
-    """
-    files = dict(attachments or {})
-    if "scenario" in recording.metadata:
-        files.setdefault("scenario.yaml", recording.metadata["scenario"])
-    measured = recording.metadata.get(naming.ORIGIN_KEY) == naming.MEASURED
-    longest = max((recording.tables.get(name, Table(np.zeros(0))) for name in naming.VIEWED_TABLES), key=len)
-    rate = np.inf
-    if len(longest) > VIEW_SAMPLES:
-        rate = view_rate(float(longest.time[-1] - longest.time[0]))
-    with LogWriter(path, metadata=recording.metadata, attachments=files, view_rate_hz=rate) as log:
-        log.write_static(recording.static)
-        for event in recording.events:
-            log.write_event(event)
-        for name, table in recording.tables.items():
-            log.write(naming.MEASURED if measured and name == "state" else name, table)
-        if scene:
-            from hdsim.log.scene import write_scene
-
-            write_scene(log, recording)
-    return Path(path)
