@@ -91,7 +91,11 @@ def propose(
         raise InputError("no experiment could be simulated with these candidates")
     chosen = ranked[0]
     words = dict(titles or {})
-    one, other = (words.get(name, name.replace("_", " ")) for name in chosen.pair)
+    said = {name: words.get(name, name.replace("_", " ")) for name in names}
+    one, other = (said[name] for name in chosen.pair)
+    hardest = f" between {one} and {other}, the hardest to tell" if len(names) > 2 else ""
+    channel = chosen.channel.replace("_", " ")
+    apart = f"{', '.join(list(said.values())[:-1])} and {said[names[-1]]}"
     considered = [
         Candidate(
             title=o.experiment.title,
@@ -101,10 +105,9 @@ def propose(
         for o in ranked
     ]
     sentence = (
-        f"To tell {one} from {other}: {chosen.experiment.title}. Expected d' {chosen.separation:.2g} "
-        f"({again:.2g} from repeating the record). They are told apart by "
-        f"{chosen.channel.replace('_', ' ')}: they say up to {chosen.difference:.2g} "
-        f"{CHANNELS[chosen.channel]} apart, at {chosen.at_s:.2g} s."
+        f"To tell {apart} apart: {chosen.experiment.title}. Expected d' {chosen.separation:.2g}{hardest} "
+        f"({again:.2g} from repeating the record). Look at {channel}: they say up to "
+        f"{chosen.difference:.2g} {CHANNELS[chosen.channel]} apart, at {chosen.at_s:.2g} s."
     )
     proposal = NextExperiment(
         sentence=sentence,

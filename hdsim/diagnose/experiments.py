@@ -81,7 +81,7 @@ class Experiment:
     encoder_turned_deg: float = 0.0
     motion: SignalData | None = None
     load_torque: SignalData | None = None
-    lead_in_s: float = 0.3
+    lead_in_s: float = 0.5
 
     def shifted(self) -> tuple[Experiment, float] | None:
         """With the motor's zero elsewhere, and by how much (rad at the output); None where that is known.
