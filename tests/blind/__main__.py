@@ -89,6 +89,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--results", type=Path, help="JSON-lines file: cases in it are not run again")
     parser.add_argument("--write", type=Path, help="write the page here")
+    parser.add_argument("--known", action="store_true", help="run nothing, report what --results holds")
     parser.add_argument("--list", action="store_true", help="only list the keys")
     given = parser.parse_args()
     chosen = wanted(given)
@@ -98,6 +99,8 @@ def main() -> None:
         print("\n".join(t.key for t in chosen))
         return
     results = done(given.results, {t.key for t in chosen})
+    if given.known:
+        chosen = [t for t in chosen if t.key in results]
     todo = [t for t in chosen if t.key not in results]
     print(f"{len(chosen)} cases, {len(results)} of them known", flush=True)
     started = time.perf_counter()

@@ -238,7 +238,8 @@ EFFECTS = (
         "wg_once", "wg_once_phase", 0.02e-3 / 25, "eccentricity_um", "phase_deg")),
     Hidden("damaged_tooth", tooth, most=100, expected=tooth_expected),
     Hidden("output_eccentricity",
-           lambda d, r, x, same: {"out_once": 1e-5 * x, "out_once_phase": _phase(r[0])}, most=100, accepted=("output_eccentricity", "kinematic_error"), expected=_degrees(
+           lambda d, r, x, same: {"out_once": 1e-5 * x, "out_once_phase": _phase(r[0])}, most=100,
+           accepted=("output_eccentricity", "sensors"), expected=_degrees(
                "out_once", "out_once_phase", 1e-3 / 25, "eccentricity_um", "phase_deg")),
     Hidden("output encoder eccentricity",
            lambda d, r, x, same: {"encoder_once": 1e-5 * x, "encoder_phase": _phase(r[0])}, most=100,

@@ -65,14 +65,26 @@ def _explained(setup: Setup) -> np.ndarray:
     return basis[:, values > 1e-8 * values[0]]
 
 
-def strength(setup: Setup, changes: dict[str, float]) -> Strength:
-    """Strength of the trace that ``changes`` leave."""
+def _trace(setup: Setup, changes: dict[str, float]) -> np.ndarray:
+    """Trace of changes over the noise, less its mean, shape (channels, n)."""
     p, base = numbers(setup, changes), numbers(setup, {})
     log = truth(setup, p)
     trace = weighed(setup, p, log) - weighed(setup, base, truth(setup, base, log))
-    centred = trace - trace.mean(axis=1, keepdims=True)
+    return trace - trace.mean(axis=1, keepdims=True)
+
+
+def plain_strength(setup: Setup, changes: dict[str, float]) -> Strength:
+    """Strength of numbers of the base that are off: nothing is left beyond the base."""
+    size = np.sqrt(np.mean(_trace(setup, changes) ** 2, axis=1))
+    best = int(np.argmax(size))
+    return Strength(float(size[best]), 0.0, setup.compared()[best])
+
+
+def strength(setup: Setup, changes: dict[str, float]) -> Strength:
+    """Strength of the trace that ``changes`` leave."""
+    centred = _trace(setup, changes)
     basis, flat = _explained(setup), centred.ravel()
-    rest = (flat - basis @ (basis.T @ flat)).reshape(trace.shape)
+    rest = (flat - basis @ (basis.T @ flat)).reshape(centred.shape)
     beyond = np.sqrt(np.mean(rest**2, axis=1))
     best = int(np.argmax(beyond))
     return Strength(
