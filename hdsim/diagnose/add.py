@@ -115,7 +115,8 @@ def fitted_numbers(added: Added, covariance: Array, shape_spreads: Array) -> dic
         elif isinstance(term, Harmonic):
             harmonic(term.amplitude, term.phase, term.unit)
         else:
-            for k, order in enumerate(added.orders):
+            before = len(added.fitting.items(term.section))
+            for k, order in enumerate(added.orders, start=before):
                 path = f"{term.section}.{k}"
                 found[f"{path}.order"] = FittedNumber(value=order)
                 harmonic(f"{path}.{term.amplitude}", f"{path}.phase_deg", term.unit)

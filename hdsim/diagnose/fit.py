@@ -208,22 +208,10 @@ def sensitivities(bench: Bench, vector: _Vector, x: Array) -> Array:
     if base is None or not rest:
         return np.zeros((rows, len(rest)))
     columns = [
-        np.zeros(rows) if there is None else trace(bench, base, there) / step
+        np.zeros(rows) if there is None else bench.trace(base, there) / step
         for there, step in zip(rest, steps, strict=True)
     ]
     return np.column_stack(columns)
-
-
-def trace(bench: Bench, base: Sequence[Array], there: Sequence[Array]) -> Array:
-    """Whitened difference of two sets of predictions, offsets removed, shape (rows,)."""
-    differences = []
-    for series, a, b in zip(bench.series, base, there, strict=True):
-        if not len(a):
-            differences.append(np.zeros(0))
-            continue
-        change = b - a
-        differences.append(change - change[series.train].mean() if series.train.any() else change)
-    return bench.stacked(differences)
 
 
 def _stacked(bench: Bench, predictions: Sequence[Array]) -> Array:

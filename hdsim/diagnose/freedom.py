@@ -80,7 +80,8 @@ class Added:
                 put(data, term.phase, math.degrees(math.atan2(c[at + 1], c[at])))
                 at += 2
             else:
-                items = []
+                items = _copied(self.fitting.items(term.section))
+                items = _copied(_at(data, term.section)) if items else items
                 for order in self.orders:
                     item = dict(term.settings) | {"order": order}
                     item[term.amplitude] = term.unit * math.hypot(c[at], c[at + 1])
@@ -232,6 +233,12 @@ def _multiplied(model: BaseModel, path: str, factor: float) -> Any:
     value = getattr(model, name)
     new = _multiplied(value, rest, factor) if rest else value * factor
     return model.model_copy(update={name: new})
+
+
+def _at(data: Any, path: str) -> Any:
+    for key in path.split("."):
+        data = data[key]
+    return data
 
 
 def put(data: dict[str, Any], path: str, value: Any) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, fit, trace
+from hdsim.diagnose.fit import Fit, fit
 from hdsim.diagnose.freedom import Added, Free, State, signed
 from hdsim.diagnose.locate import Line
 from hdsim.diagnose.measured import Array
@@ -32,13 +32,15 @@ LEVEL = 0.02
 #: Least share of the weighed residual that an effect must explain to be worth a name.
 LEAST_SHARE = 0.03
 #: Candidates that are fitted in full, and the part of the best share that they must reach on the screen.
-SHORTLIST, NEAR = 4, 0.75
+SHORTLIST, NEAR = 5, 0.75
 #: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
 FAR = 0.7
 #: Part of its share that another effect must keep beside the best to be an effect of its own.
 BESIDE = 0.6
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
 SAME = 0.02
+#: The same for effects that are known to look alike, when neither reaches the noise.
+MISMATCH = 0.1
 
 
 @dataclass
@@ -126,6 +128,9 @@ def screen(
         for fitting in fittings:
             if any(channel not in bench.channels for channel in fitting.needs):
                 continue
+            if bench.turns < fitting.turns:
+                found.skipped[name] = f"the wave generator makes {bench.turns:.2g} turns only"
+                continue
             if (name, fitting.label) in {(added.effect, added.fitting.label) for added in state.added}:
                 continue
             if behind_sensor(bench, state, name, fitting):
@@ -175,9 +180,10 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
     orders: tuple[float, ...] = ()
     for term in fitting.terms:
         if isinstance(term, Periodic):
-            own = [line for line in lines if line.channel == term.channel and line.order >= 1.0]
-            orders = tuple(line.order for line in own[:MOST_ORDERS])
-            if not orders:
+            own = [line.order for line in lines if line.channel == term.channel and line.order >= 1.0]
+            own = [order for order in own if not any(abs(order - o) < 0.05 for o in term.besides)]
+            orders = tuple(own[:MOST_ORDERS])
+            if not orders and not term.besides:
                 return []
     count = len(signed(fitting, len(orders)))
     return [
@@ -244,7 +250,7 @@ def traces(
         for one in own:
             if one is None:
                 break
-            columns.append(trace(bench, before, one))
+            columns.append(bench.trace(before, one))
             if added.fitting.cumulative:
                 before = one
         found.append(np.column_stack(columns) if len(columns) == len(own) else None)
@@ -309,7 +315,11 @@ def name_effect(
         spread = float(np.sqrt(len(difference)) * difference.std())
         if beside(residual, on_screen[name], on_screen[other]):
             continue
-        if difference.sum() < 2.0 * spread or difference.sum() < SAME * explained:
+        same = max(2.0 * spread, SAME * explained)
+        if confusable(name, other):
+            # Two formulas that both miss the noise are not told apart by less than what the better one lacks.
+            same = max(same, min(float(losses.sum()) - bench.noise_power, MISMATCH * explained))
+        if difference.sum() < same:
             group[other] = float((before - rest).sum()) / explained
     return Named(
         name,
@@ -337,7 +347,8 @@ def _fitted(bench: Bench, base: Fit, added: Added) -> Fit | None:
     for theta in begins:
         try:
             found.append(
-                fit(bench, state, frees, held_effects=len(base.state.added), evaluations=6, prune=False,
+                fit(bench, state, frees, held_effects=len(base.state.added), prune=False,
+                    evaluations=6 if len(begins) == 1 else 12,
                     theta=theta)
             )  # fmt: skip
         except (PredictionError, np.linalg.LinAlgError):
@@ -345,6 +356,12 @@ def _fitted(bench: Bench, base: Fit, added: Added) -> Fit | None:
     if not found:
         return None
     return min(found, key=lambda one: float(block_losses(bench, one.predictions).sum()))
+
+
+def confusable(one: str, other: str) -> bool:
+    """Whether one of two effects says that it can look like the other."""
+    known = catalogue()
+    return other in known[one].signature.confused_with or one in known[other].signature.confused_with
 
 
 def beside(residual: Residual, one: Screened, other: Screened) -> bool:

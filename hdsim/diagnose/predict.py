@@ -141,7 +141,8 @@ class Predictor:
         if plan.locked:
             # The encoder's zero means nothing there: the drive is unwound where it carries no torque.
             coefficients[0] -= unloaded_angle(record)
-        self.motion = signal(breaks, coefficients, LEAD_IN_S)
+        self._breaks, self._coefficients = breaks, coefficients
+        self.turn(0.0)
         self.load_torque: SignalData | None = None
         if plan.load != "scenario":
             breaks, coefficients = smoothed(record.time, record.filled(plan.load))
@@ -152,11 +153,21 @@ class Predictor:
             factor = ratio if plan.motion == "output_angle" else 1.0
             self._slow = SlowPart(record.time, factor * values / (2 * np.pi))
             self._slow_torque = self._slow.of(record.filled("output_torque"))
-        motion = self.motion.values(record.time + LEAD_IN_S)
-        #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
-        self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
         self.ratio = ratio
         self.runs = 0
+
+    def turn(self, angle: float) -> None:
+        """Turn the prescribed motion: only where the output is locked does its zero mean anything.
+
+        Args:
+            angle: added to the motor's angle, rad.
+        """
+        self._coefficients = self._coefficients.copy()
+        self._coefficients[0] += angle
+        self.motion = signal(self._breaks, self._coefficients, LEAD_IN_S)
+        motion = self.motion.values(self.record.time + LEAD_IN_S)
+        #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
+        self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
 
     def predict(self, candidate: Candidate) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.

@@ -48,14 +48,22 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     before = bench.predict(state.candidate(), state.gain)
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5)
+    align(bench, found)
     # Weights follow the residual: what the first fit explained no longer counts as noise.
     bench.weigh(bench.residuals(found.predictions))
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     undetermined, ties = found.undetermined, found.ties
     found = fit(bench, state, found.frees, theta=theta, prune=False, evaluations=5)
     found.undetermined, found.ties = undetermined, ties
+    align(bench, found)
     reweigh(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
+
+
+def align(bench: Bench, found: Fit) -> None:
+    """Turn locked records to where the fitted model carries nothing."""
+    if bench.align(found.state, found.predictions):
+        found.predictions = bench.predict(found.state.candidate(), found.state.gain)
 
 
 def reweigh(bench: Bench, found: Fit) -> None:

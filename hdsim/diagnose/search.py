@@ -18,6 +18,7 @@ from hdsim.diagnose.freedom import State
 from hdsim.diagnose.locate import Line, Location, locate, order_lines
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.name import (
+    LEAST_SHARE,
     LEVEL,
     SAME,
     Named,
@@ -25,17 +26,19 @@ from hdsim.diagnose.name import (
     at_present,
     block_losses,
     channel_powers,
+    confusable,
     name_effect,
     screen,
 )
 from hdsim.diagnose.predict import PredictionError
-from hdsim.diagnose.refit import reweigh
+from hdsim.diagnose.refit import align, reweigh
 from hdsim.diagnose.screen import Residual
 
 #: Most effects that one diagnosis adds.
 MOST_EFFECTS = 4
-#: Part of a channel's first residual that a later effect must explain.
-LATER_SHARE = 0.015
+#: Part of a channel's first residual that a later effect must explain; more where it can look like what an
+#: effect that is there already leaves, because the true formula is never quite the catalogue's.
+LATER_SHARE, LATER_ALIKE = 0.02, 0.1
 
 Step = Callable[[str], object]
 
@@ -82,28 +85,35 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         stage.screening = screen(
             bench, current.state, current.predictions, found.left, stage.location.lines, on_step=tell
         )
-        if not stage.screening.ranked or stage.screening.chance > LEVEL:
+        ranked = stage.screening.ranked
+        if not ranked or stage.screening.chance > LEVEL:
+            break
+        if not found.named and ranked[0].share.share < LEAST_SHARE:
             break
         tell = during("fit", "fitting the shortlist")
         named = name_effect(bench, current, stage.screening, found.left, on_step=tell)
-        if named is None or not _matters(bench, base, current, named.fit):
+        if named is None or not _matters(bench, base, current, named, found.named):
             break
         stage.named = named
         found.named.append(named)
         current = named.fit
+        align(bench, current)
         reweigh(bench, current)
         if len(found.named) > 1:
             tell = during("again", "asking each name again beside the others")
             current = _again(bench, base, _together(bench, current), found, tell)
+            align(bench, current)
             reweigh(bench, current)
     found.fit = current
     return found
 
 
-def _matters(bench: Bench, base: Fit, before: Fit, after: Fit) -> bool:
+def _matters(bench: Bench, base: Fit, before: Fit, new: Named, others: list[Named]) -> bool:
     """Whether an effect explains enough beside what was there first, in one channel at least."""
-    first, last, now = (channel_powers(bench, each.predictions) for each in (base, before, after))
-    return max(last[c] - now[c] - LATER_SHARE * first[c] for c in first) >= 0
+    alike = any(confusable(new.name, other.name) or new.name in other.group for other in others)
+    least = LATER_ALIKE if alike else LATER_SHARE
+    first, last, now = (channel_powers(bench, each.predictions) for each in (base, before, new.fit))
+    return not others or max(last[c] - now[c] - least * first[c] for c in first) >= 0
 
 
 def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
@@ -133,7 +143,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         named = None
         if screening.ranked and screening.chance <= LEVEL:
             named = name_effect(bench, without, screening, left, on_step=tell)
-        if named is None or not _matters(bench, base, without, named.fit):
+        rest = found.named[:k] + found.named[k + 1 :]
+        if named is None or not _matters(bench, base, without, named, rest):
             # The others explain what it did.
             found.named.pop(k)
             current = without
@@ -159,5 +170,6 @@ def _left(bench: Bench, current: Fit) -> Residual:
     """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
     numbers = bench.stacked_series()
     offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
-    columns: Array = np.hstack([current.columns, offsets])
+    unwound = [column[:, None] for column in bench.unwound(current.state, current.predictions).values()]
+    columns: Array = np.hstack([current.columns, offsets, *unwound])
     return Residual(bench.stacked(bench.residuals(current.predictions)), columns, bench.stacked_blocks())

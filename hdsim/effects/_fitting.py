@@ -54,6 +54,7 @@ class Periodic:
         unit: its value at coefficient 1.
         settings: further fields of an item.
         channel: the channel whose order spectrum says which orders.
+        besides: orders that the fitting's other terms have; given, the term may find no other ones.
     """
 
     section: str
@@ -61,6 +62,7 @@ class Periodic:
     unit: float
     channel: str
     settings: Mapping[str, Any] = field(default_factory=dict)
+    besides: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,7 @@ class Fitting:
         settings: fields that stay as given here, nested.
         label: tells this way from the effect's others.
         needs: channels without which it cannot be told.
+        turns: least travel of the wave generator, in turns, without which its trace looks like anything.
         cumulative: a term has a meaning only on top of those before it, and adds to their fields.
     """
 
@@ -89,4 +92,12 @@ class Fitting:
     settings: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
     needs: tuple[str, ...] = ()
+    turns: float = 0.0
     cumulative: bool = False
+
+    def items(self, section: str) -> list[Any]:
+        """Items that a list of the effect has before periodic terms add theirs."""
+        here: Any = self.settings
+        for key in section.split("."):
+            here = here.get(key, {})
+        return list(here)

@@ -60,6 +60,14 @@ class DamagedTooth(Effect):
             (Amplitude({"amplitude_arcmin": 0.2}, signed=True),),
             shapes=(Shape("position_deg", (15.0, 45.0, 75.0, 105.0, 135.0, 165.0)),),
             settings={"width_deg": 15.0},
+            turns=1.0,
+        ),
+        Fitting(
+            (Amplitude({"amplitude_arcmin": 0.2}, signed=True),),
+            shapes=(Shape("position_deg", tuple(30.0 * k + 15.0 for k in range(12))),),
+            settings={"width_deg": 15.0, "passes_per_turn": 1},
+            label="at one lobe",
+            turns=1.0,
         ),
     )
 

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from hdsim.effects._fitting import Fitting, Harmonic
+from hdsim.effects._fitting import Fitting, Harmonic, Periodic
 from hdsim.effects._kernels import ARCMIN, harmonics
 from hdsim.parts import Builder, Effect, Parameters, Signature
 
@@ -88,10 +88,21 @@ class KinematicError(Effect):
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
-            tuple(
-                Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.1)
-                for k in range(3)
+            (
+                *(
+                    Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.1)
+                    for k in range(3)
+                ),
+                Periodic(
+                    "components",
+                    "amplitude_arcmin",
+                    0.1,
+                    "output_angle",
+                    settings={"per": "wave_generator_turn"},
+                    besides=(1.0, 2.0, 2.02, 4.0),
+                ),
             ),
+            turns=1.0,
             settings={
                 "components": [
                     {"order": 2, "per": "wave_generator_turn"},

@@ -47,7 +47,10 @@ class Unbalance(Effect):
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting((Harmonic("output_kg_m", "output_phase_deg", 0.1),), label="output"),
         Fitting(
-            (Harmonic("motor_kg_m", "motor_phase_deg", 1e-3),), settings={"output_kg_m": 0.0}, label="motor"
+            (Harmonic("motor_kg_m", "motor_phase_deg", 1e-3),),
+            settings={"output_kg_m": 0.0},
+            label="motor",
+            turns=1.0,
         ),
     )
 

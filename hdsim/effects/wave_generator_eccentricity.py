@@ -38,7 +38,9 @@ class WaveGeneratorEccentricity(Effect):
             "kinematic_error": "the dominant order is 2",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Harmonic("eccentricity_um", "phase_deg", 10.0),)),)
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Harmonic("eccentricity_um", "phase_deg", 10.0),), turns=1.0),
+    )
 
     eccentricity_um: float = Field(10.0, ge=0)
     """Offset d of the axes of wave generator and fixed spline, um."""
