@@ -299,7 +299,7 @@ OUTSIDE = (
         "cable": 0.1 * d.torques[0] * x, "cable_at": _between(0.05, 0.2, r[0]), "cable_width": 0.25},
         most=40),
     Hidden("drifting torque", lambda d, r, x, same: {"drift": d.coulomb * x}, most=10),
-    Hidden("churning", lambda d, r, x, same: {"churn": 0.5 * d.coulomb / d.top_speed**2 * x}, most=20),
+    Hidden("churning", lambda d, r, x, same: {"churn": 0.5 * d.coulomb / d.top_speed**2 * x}, most=6),
     Hidden("cogging of the load", lambda d, r, x, same: {
         "cogging": 0.05 * d.torques[0] * x, "cogging_order": float(7 + 2 * int(3 * r[0]))}, most=40),
     Hidden("spring-mounted mass on the output", lambda d, r, x, same: {

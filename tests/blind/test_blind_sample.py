@@ -4,7 +4,16 @@ import pytest
 from cases import trials
 from judging import attempt
 
-SAMPLE = ("null/nothing#1/0",)
+#: Short records of several drives, one or more of each kind of answer.
+SAMPLE = (
+    "null/nothing#4/0",
+    "parameter/load-dependent loss/0",
+    "clear/output encoder delay/0",
+    "clear/unbalance/0",
+    "clear/output_eccentricity/0",
+    "pair/lugre_friction + wave_generator_eccentricity/2",
+    "outside/drifting torque/0",
+)
 
 
 @pytest.mark.slow
