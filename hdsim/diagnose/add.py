@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from hdsim.diagnose.freedom import Added, Free, State, merge, put
+from hdsim.diagnose.freedom import Added, Free, State, merge, number_at, put
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.verdict import FittedNumber
 from hdsim.effects._fitting import Amplitude, Harmonic, Inverse
@@ -38,7 +38,7 @@ def scenario_text(base: Path, state: State, freedoms: Sequence[Free], start: Sta
         for path in free.paths:
             if path == "gain":
                 continue
-            new, old = _number(state, path), _number(start, path)
+            new, old = number_at(state, path), number_at(start, path)
             if new is not None and old is not None and new != old:
                 put(data, path, _rounded(new))
     effects: dict[str, Any] = {}
@@ -60,14 +60,6 @@ def _lists(state: State, name: str) -> dict[str, Any]:
         for field, value in (effect or ())
         if isinstance(value, tuple) and value and isinstance(value[0], BaseModel)
     }
-
-
-def _number(state: State, path: str) -> float | None:
-    section, _, rest = path.partition(".")
-    here: Any = {"drive": state.drive, "load": state.load, "effects": state.effects}[section]
-    for key in rest.split("."):
-        here = here[key] if isinstance(here, dict) else getattr(here, key)
-    return float(here) if here is not None else None
 
 
 def fitted_numbers(added: Added, covariance: Array, shape_spreads: Array) -> dict[str, FittedNumber]:

@@ -22,7 +22,7 @@ from hdsim.diagnose.locate import Location, coordinates, hats
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.penalised import UNSEEN, Penalised, penalised, roughness
 from hdsim.diagnose.screen import Residual
-from hdsim.diagnose.search import _left as left_of
+from hdsim.diagnose.search import left_of
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects.table import COORDINATE_UNITS, Acting, Coordinate, TableCurve, cells
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from hdsim.diagnose.bench import THREADS, Bench
 from hdsim.diagnose.experiments import Experiment, experiments, limits_of
-from hdsim.diagnose.fit import Fit, _correlation, _Vector
+from hdsim.diagnose.fit import Fit, Vector, correlation
 from hdsim.diagnose.freedom import State
 from hdsim.diagnose.further import Candidate, NextExperiment
 from hdsim.diagnose.measured import CHANNELS, Array
@@ -147,7 +147,7 @@ def noise_of(bench: Bench, fit: Fit) -> dict[str, float]:
     for series, rest in zip(bench.series, bench.residuals(fit.predictions), strict=True):
         rows = series.train
         if len(rest) and rows.any():
-            power = float(np.mean(rest[rows] ** 2)) * _correlation(rest[rows], series.block[rows])
+            power = float(np.mean(rest[rows] ** 2)) * correlation(rest[rows], series.block[rows])
             found.setdefault(series.channel, []).append(max(power, series.noise**2, 1e-30))
     return {channel: math.sqrt(float(np.mean(powers))) for channel, powers in found.items()}
 
@@ -225,7 +225,7 @@ def _steps(fit: Fit) -> list[tuple[State, float]]:
     """Every fitted number moved a little, with the step, in the order of the fit's covariance."""
     # How many of the effects were held while it was fitted shows in the size of the covariance.
     for held in range(len(fit.state.added), -1, -1):
-        vector = _Vector(fit.state, tuple(fit.frees), held)
+        vector = Vector(fit.state, tuple(fit.frees), held)
         x = vector.start()
         if len(x) == len(fit.covariance):
             break
@@ -245,7 +245,7 @@ def _simulated(
     """The channels that an experiment measures under a model, without its start; None when it fails."""
     from hdsim.actuation.command import Command
     from hdsim.actuation.loads import Load
-    from hdsim.diagnose.predict import PredictionError, _MeasuredTorque
+    from hdsim.diagnose.predict import MeasuredTorque, PredictionError
     from hdsim.drive.model import Model
     from hdsim.simulation.run import Run
 
@@ -275,7 +275,7 @@ def _simulated(
     parts: list[Any] = [*effects.values()]
     if experiment.load_torque is not None:
         load = load.model_copy(update={"torque": None})
-        parts.append(_MeasuredTorque(experiment.load_torque))
+        parts.append(MeasuredTorque(experiment.load_torque))
     parts.append(load)
     model = Model(drive, parts, load_inertia_kg_m2=load.inertia_kg_m2, motions=motions, seed=candidate.seed)
     run = Run(model, duration_s=experiment.duration_s, sample_rate_hz=rate, rtol=RTOL)

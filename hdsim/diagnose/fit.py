@@ -56,7 +56,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class _Vector:
+class Vector:
     """The free numbers as one vector: logarithms, then coefficients and logarithms of shapes of effects."""
 
     base: State
@@ -64,12 +64,14 @@ class _Vector:
     first: int  # effects before this one are held fixed
 
     def start(self, theta: Mapping[str, float] | None = None) -> Array:
+        """Where a fit begins; ``theta`` replaces logarithms of the base's factors, by name."""
         values = [(theta or {}).get(free.name, 0.0) for free in self.frees]
         for added in self.base.added[self.first :]:
             values += [*added.coefficients, *(math.log(shape) for shape in added.shapes)]
         return np.array(values)
 
     def state(self, x: Array) -> State:
+        """The model at ``x``."""
         state = scaled(self.base, self.frees, x[: len(self.frees)].tolist())
         at = len(self.frees)
         effects = list(self.base.added[: self.first])
@@ -82,12 +84,14 @@ class _Vector:
         return replace(state, added=tuple(effects))
 
     def priors(self) -> Array:
+        """Prior standard deviations, shape (p,)."""
         spreads = [free.prior for free in self.frees]
         for added in self.base.added[self.first :]:
             spreads += [COEFFICIENT_PRIOR] * len(added.coefficients) + [SHAPE_PRIOR] * len(added.shapes)
         return np.array(spreads)
 
     def lower(self) -> Array:
+        """Lower bounds, shape (p,)."""
         bounds = [-3.0] * len(self.frees)
         for added in self.base.added[self.first :]:
             bounds += [-math.inf if s else 0.0 for s in signed(added.fitting, len(added.orders))]
@@ -95,6 +99,7 @@ class _Vector:
         return np.array(bounds)
 
     def upper(self) -> Array:
+        """Upper bounds, shape (p,)."""
         bounds = [3.0] * len(self.frees)
         for added in self.base.added[self.first :]:
             bounds += [math.inf] * len(added.coefficients)
@@ -102,6 +107,7 @@ class _Vector:
         return np.array(bounds)
 
     def steps(self, x: Array) -> Array:
+        """Steps of finite differences at ``x``, shape (p,)."""
         steps = [STEP] * len(self.frees)
         at = len(self.frees)
         for added in self.base.added[self.first :]:
@@ -143,7 +149,7 @@ def fit(
     ties: dict[str, list[str]] = {}
     if prune and chosen:
         chosen, undetermined, ties = _determined(bench, state, chosen, held_effects, blocks, theta)
-    vector = _Vector(state, tuple(chosen), held_effects)
+    vector = Vector(state, tuple(chosen), held_effects)
     x0 = vector.start(theta)
     first = vector.state(x0)
     start = _stacked(bench, bench.predict(first.candidate(), first.gain))
@@ -151,7 +157,7 @@ def fit(
         predictions = bench.predict(state.candidate(), state.gain)
         empty = np.zeros((len(start), 0))
         return Fit(state, [], x0, np.zeros((0, 0)), predictions, empty, undetermined, ties)
-    worth = 1.0 / math.sqrt(_correlation(start, blocks) * max(float(np.mean(start**2)), 1e-30))
+    worth = 1.0 / math.sqrt(correlation(start, blocks) * max(float(np.mean(start**2)), 1e-30))
     priors, centre = vector.priors(), vector.start()
     centre[len(chosen) :] = np.where(
         np.isfinite(vector.lower()[len(chosen) :]) & (priors[len(chosen) :] == SHAPE_PRIOR),
@@ -195,7 +201,7 @@ def fit(
     return Fit(fitted, chosen, factors, covariance, predictions, columns, undetermined, ties)
 
 
-def sensitivities(bench: Bench, vector: _Vector, x: Array) -> Array:
+def sensitivities(bench: Bench, vector: Vector, x: Array) -> Array:
     """Derivatives of the whitened predictions, offsets removed, shape (rows, p)."""
     states = [vector.state(x)]
     steps = vector.steps(x)
@@ -218,7 +224,7 @@ def _stacked(bench: Bench, predictions: Sequence[Array]) -> Array:
     return bench.stacked(bench.residuals(predictions))
 
 
-def _correlation(rest: Array, blocks: NDArray[np.int64]) -> float:
+def correlation(rest: Array, blocks: NDArray[np.int64]) -> float:
     """Samples for which one independent sample counts: variance of block sums over that of white noise."""
     sums = np.bincount(blocks, rest)
     counts = np.bincount(blocks)
@@ -264,12 +270,12 @@ def _determined(
     The scaled Jacobian's singular values say how many directions the data see; the number with the largest
     share in an unseen one is dropped, one after the other.
     """
-    vector = _Vector(state, tuple(frees), held_effects)
+    vector = Vector(state, tuple(frees), held_effects)
     x0 = vector.start(theta)
     columns = sensitivities(bench, vector, x0)
     first = vector.state(x0)
     rest = _stacked(bench, bench.predict(first.candidate(), first.gain))
-    power = max(float(np.mean(rest**2)), 1e-30) * _correlation(rest, blocks)
+    power = max(float(np.mean(rest**2)), 1e-30) * correlation(rest, blocks)
     priors = vector.priors()
     kept = list(range(len(frees)))
     others = list(range(len(frees), columns.shape[1]))

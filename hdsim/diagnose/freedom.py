@@ -241,6 +241,15 @@ def _at(data: Any, path: str) -> Any:
     return data
 
 
+def number_at(state: State, path: str) -> float | None:
+    """A number of a state by its dotted path in the scenario; None where it is not set."""
+    section, _, rest = path.partition(".")
+    here: Any = {"drive": state.drive, "load": state.load, "effects": state.effects}[section]
+    for key in rest.split("."):
+        here = here[key] if isinstance(here, dict) else getattr(here, key)
+    return float(here) if here is not None else None
+
+
 def put(data: dict[str, Any], path: str, value: Any) -> None:
     """Set a value by its dotted path; numbers in the path are indices of lists that are there."""
     here: Any = data

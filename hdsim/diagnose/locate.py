@@ -158,7 +158,7 @@ def coordinates(bench: Bench, series: Series, residuals: Sequence[Array]) -> dic
     return found
 
 
-def order_lines(bench: Bench, residuals: list[Array], channel: str, most: int = 4) -> list[Line]:
+def order_lines(bench: Bench, residuals: list[Array], channel: str, most: int = 6) -> list[Line]:
     """Strongest orders per wave-generator turn in a channel's residual.
 
     The amplitude at an order is the least-squares one over the measured angle, so the speed may vary.
@@ -196,6 +196,8 @@ def order_lines(bench: Bench, residuals: list[Array], channel: str, most: int = 
     rest = e
     while len(lines) < most:
         shares = 2.0 * np.abs(waves @ rest / len(rest)) ** 2 / power
+        for near in (np.abs(orders - line.order) < 1.0 / turns for line in lines):
+            shares[near] = 0.0
         k = int(np.argmax(shares))
         if shares[k] < max(LEAST_LINE, 10.0 * float(np.median(shares))):
             break
@@ -203,8 +205,6 @@ def order_lines(bench: Bench, residuals: list[Array], channel: str, most: int = 
         whole = round(order)
         if whole >= 1 and abs(order - whole) <= 0.5 / turns:
             order = float(whole)
-        if any(abs(order - line.order) < 1.0 / turns for line in lines):
-            break
         lines.append(Line(channel, order, 2.0 * abs(np.mean(rest * np.exp(-1j * order * theta))), shares[k]))
         # The next one is looked for in what all lines so far leave, so that no side lobe is taken for a line.
         angles = np.outer(theta, [line.order for line in lines])

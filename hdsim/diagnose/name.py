@@ -17,13 +17,13 @@ import numpy as np
 
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.fit import Fit, fit
-from hdsim.diagnose.freedom import Added, Free, State, signed
+from hdsim.diagnose.freedom import Added, Free, State, number_at, signed
 from hdsim.diagnose.locate import Line
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import CARRIED, PredictionError
 from hdsim.diagnose.screen import Residual, Share, chance_of
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Amplitude, Fitting, Periodic
+from hdsim.effects._fitting import Amplitude, Fitting, Inverse, Periodic
 
 #: Orders of a periodic term that are taken from the spectra.
 MOST_ORDERS = 3
@@ -33,10 +33,14 @@ LEVEL = 0.02
 LEAST_SHARE = 0.03
 #: Candidates that are fitted in full, and the part of the best share that they must reach on the screen.
 SHORTLIST, NEAR = 5, 0.75
+#: The same part for effects that are known to look like the best: the screen is linear, they are not.
+ALIKE = 0.5
 #: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
 FAR = 0.7
 #: Part of its share that another effect must keep beside the best to be an effect of its own.
 BESIDE = 0.6
+#: Factor within which a trace's size must fit the residual's; else its unit is changed.
+FITTING = 4.0
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
 SAME = 0.02
 #: The same for effects that are known to look alike, when neither reaches the noise.
@@ -123,10 +127,12 @@ def screen(
             found.skipped[name] = "the model has it"
             continue
         if not fittings:
-            found.skipped[name] = "declares no fitting"
-            continue
+            continue  # it stands for what has no name
         for fitting in fittings:
             if any(channel not in bench.channels for channel in fitting.needs):
+                continue
+            if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):
+                found.skipped[name] = f"the model has {' and '.join(fitting.covered_by)}"
                 continue
             if bench.turns < fitting.turns:
                 found.skipped[name] = f"the wave generator makes {bench.turns:.2g} turns only"
@@ -142,7 +148,8 @@ def screen(
     if on_step is not None:
         on_step(f"{len(tried)} traces")
     best: dict[str, Screened] = {}
-    for added, columns in zip(tried, traces(bench, state, predictions, tried), strict=True):
+    wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
+    for added, columns in traces(bench, state, predictions, tried, wanted):
         if columns is None or not np.any(columns):
             continue
         share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
@@ -195,8 +202,7 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
 def _sized(term: Any, ranges: Mapping[str, float]) -> Any:
     if not isinstance(term, Amplitude) or not term.of_range:
         return term
-    units = {path: unit * ranges[term.of_range] for path, unit in term.units.items()}
-    return replace(term, units=units, of_range="")
+    return replace(_scaled(term, ranges[term.of_range]), of_range="")
 
 
 def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bool:
@@ -221,8 +227,8 @@ def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bo
 
 
 def traces(
-    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added]
-) -> list[Array | None]:
+    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added], wanted: float
+) -> list[tuple[Added, Array | None]]:
     """Change of the whitened predictions for each coefficient at 1 alone, shape (rows, k).
 
     Args:
@@ -230,10 +236,33 @@ def traces(
         state: the model without the effects.
         predictions: its predictions.
         tried: the effects; each is simulated apart.
+        wanted: root-mean-square that a trace should have; units that are far too small or large for this
+            drive are changed, and the trace is simulated again.
 
     Returns:
-        One design for each effect, None where it could not be predicted.
+        Every effect in the units that were used, with its design, None where it could not be predicted.
     """
+    found = list(zip(tried, _designs(bench, state, predictions, tried), strict=True))
+    again: dict[int, Added] = {}
+    for k, (added, columns) in enumerate(found):
+        if columns is None or added.fitting.cumulative:
+            continue
+        size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
+        if size > 0 and not wanted / FITTING < size < wanted * FITTING:
+            factor = float(np.clip(wanted / size, 1e-3, 1e5))
+            terms = tuple(_scaled(term, factor) for term in added.fitting.terms)
+            again[k] = replace(added, fitting=replace(added.fitting, terms=terms))
+    for (k, added), columns in zip(
+        again.items(), _designs(bench, state, predictions, list(again.values())), strict=True
+    ):
+        if columns is not None:
+            found[k] = (added, columns)
+    return found
+
+
+def _designs(
+    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added]
+) -> list[Array | None]:
     states = []
     for added in tried:
         count = len(added.coefficients)
@@ -255,6 +284,13 @@ def traces(
                 before = one
         found.append(np.column_stack(columns) if len(columns) == len(own) else None)
     return found
+
+
+def _scaled(term: Any, factor: float) -> Any:
+    """A term whose unit is worth ``factor`` times as much."""
+    if isinstance(term, Amplitude):
+        return replace(term, units={path: unit * factor for path, unit in term.units.items()})
+    return replace(term, unit=term.unit / factor if isinstance(term, Inverse) else term.unit * factor)
 
 
 def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:
@@ -290,8 +326,12 @@ def name_effect(
         residual: what it was screened on.
         on_step: told what is being fitted.
     """
-    best_share = screening.ranked[0].share.share
-    shortlist = [one for one in screening.ranked if one.share.share >= NEAR * best_share][:SHORTLIST]
+    best = screening.ranked[0]
+    shortlist = [
+        one
+        for one in screening.ranked
+        if one.share.share >= (ALIKE if confusable(best.name, one.name) else NEAR) * best.share.share
+    ][:SHORTLIST]
     before = block_losses(bench, base.predictions)
     results: list[tuple[str, Fit, Array]] = []
     for one in shortlist:
@@ -343,12 +383,13 @@ def _fitted(bench: Bench, base: Fit, added: Added) -> Fit | None:
     begins: list[dict[str, float]] = [{}]
     if any(abs(t) > FAR for t in base.theta):
         begins.append({free.name: -float(t) for free, t in zip(base.frees, base.theta, strict=True)})
+    evaluations = 6 + 4 * bool(added.shapes) + 6 * (len(begins) > 1)
     found: list[Fit] = []
     for theta in begins:
         try:
             found.append(
                 fit(bench, state, frees, held_effects=len(base.state.added), prune=False,
-                    evaluations=6 if len(begins) == 1 else 12,
+                    evaluations=evaluations,
                     theta=theta)
             )  # fmt: skip
         except (PredictionError, np.linalg.LinAlgError):

@@ -63,13 +63,14 @@ class Candidate:
     seed: int = 0
 
 
-class _MeasuredTorque:
+class MeasuredTorque:
     """A measured torque on the output."""
 
     def __init__(self, torque: SignalData) -> None:
         self.torque = torque
 
     def contribute(self, build: Builder) -> None:
+        """Add the torque to the output."""
         from hdsim.actuation._kernels import load_torque
 
         build.element(load_torque, [build.signal(self.torque)])
@@ -183,10 +184,10 @@ class Predictor:
         load = candidate.load
         parts: list[Any] = [*candidate.effects.values(), _Gravity(load)]
         if self.load_torque is not None:
-            parts.append(_MeasuredTorque(self.load_torque))
+            parts.append(MeasuredTorque(self.load_torque))
         elif load.torque is not None:
             # The scenario's load begins with the record, after the lead-in.
-            parts.append(_MeasuredTorque(SignalData(load.torque.data.move.delayed(LEAD_IN_S))))
+            parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(LEAD_IN_S))))
         motions: dict[str, Any] = {"motor": self.motion}
         if self.plan.locked:
             motions["output"] = SignalData(Hold().move())

@@ -72,11 +72,11 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         during: told the step that begins and what it does; returns who is told the details.
     """
     current = base
-    found = Search(base, _left(bench, base))
+    found = Search(base, left_of(bench, base))
     while True:
         title = "refit" if not found.named else f"with {found.named[-1].name}"
         during("locate", f"locating what is left {title}")
-        found.left = _left(bench, current)
+        found.left = left_of(bench, current)
         stage = Stage(title, locate(bench, found.left, bench.residuals(current.predictions)))
         found.stages.append(stage)
         if len(found.named) == MOST_EFFECTS:
@@ -133,7 +133,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         except (PredictionError, np.linalg.LinAlgError):
             k += 1
             continue
-        left = _left(bench, without)
+        left = left_of(bench, without)
         lines: list[Line] = []
         residuals = bench.residuals(without.predictions)
         for channel in bench.channels:
@@ -166,7 +166,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
     return current
 
 
-def _left(bench: Bench, current: Fit) -> Residual:
+def left_of(bench: Bench, current: Fit) -> Residual:
     """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
     numbers = bench.stacked_series()
     offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)

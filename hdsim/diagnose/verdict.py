@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from hdsim.diagnose.further import CurveFound, NextExperiment
+
 VERSION = 1
 
 
@@ -119,6 +121,10 @@ class Verdict(_Part):
     """What the data check found."""
     not_tried: dict[str, str] = {}
     """Effects of the catalogue that could not be tried, with the reason."""
+    curve: CurveFound | None = None
+    """For ``unknown``: what is left as a curve over the coordinate that explains it best."""
+    next_experiment: NextExperiment | None = None
+    """What to measure next, where these data leave names that they cannot tell apart."""
     scenario: str | None = None
     """The scenario that extends the base with what was found."""
     seconds: dict[str, float] = {}

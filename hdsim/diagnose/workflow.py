@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING, Any
 from hdsim.diagnose.add import fitted_numbers
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.check import Check, check_record
+from hdsim.diagnose.curve import CurveFit, fit_curve
 from hdsim.diagnose.fit import Fit, added_spreads, base_intervals
 from hdsim.diagnose.freedom import Interval, State, state_of
 from hdsim.diagnose.measured import Array, Record, record_from
 from hdsim.diagnose.name import LEVEL, Named, block_losses
-from hdsim.diagnose.predict import LoadSource, predictors
+from hdsim.diagnose.predict import LoadSource, PredictionError, predictors
 from hdsim.diagnose.prove import gaps
 from hdsim.diagnose.refit import Refit, refit
 from hdsim.diagnose.search import Stage, search
+from hdsim.diagnose.staging import staged
+from hdsim.diagnose.suspect import suspicions
 from hdsim.diagnose.verdict import DataProblem, FittedNumber, Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
@@ -44,6 +47,7 @@ class Diagnosis:
     bench: Bench
     refit: Refit
     stages: list[Stage]
+    named: list[Named]
     final: Fit
     start: State
     predictions: dict[str, list[Array]] = field(default_factory=dict)
@@ -103,7 +107,13 @@ def diagnose(
         bench = Bench(training, predictors(held, ratio, load=load, output_locked=locked))
     start = state_of(scenario)
     with step("refit", "re-fitting the model's own numbers"):
-        base = refit(bench, start)
+        try:
+            base = refit(bench, start)
+        except PredictionError as error:
+            names = ", ".join(record.name for record in records)
+            raise InputError(f"{names}: the model cannot follow the measured motion: {error}") from None
+        doubts = suspicions(bench, base, start)
+        problems += doubts
 
     running = contextlib.ExitStack()
 
@@ -122,9 +132,13 @@ def diagnose(
     rest = last.structured * left.power
     adequate = explained >= ADEQUATE * (explained + rest)
     unknown = last.chance <= LEVEL and last.structured > STRUCTURED and not adequate
+    curve: CurveFit | None = None
     if unknown:
-        # What explains only a part is not added.
+        # What explains only a part is not added; the curve of all that is missing is.
         current = base.fit
+        with step("curve", "fitting the curve of what has no name"):
+            curve = fit_curve(bench, base.fit, stages[0].location, on_step=tell)
+        current = curve.fit if curve is not None else current
     with step("prove", "proving on held-out data"):
         states = {"before": start, "refit": base.fit.state, "after": current.state}
         gap, predictions = gaps(bench, states)
@@ -150,6 +164,7 @@ def diagnose(
             f"{100 * place.share:.0f} % of what is left of {place.channel} is a function of "
             f"{place.coordinate.replace('_', ' ')}.",
             suspects=suspects,
+            curve=curve.found() if curve is not None else None,
             **common,
         )
     elif named:
@@ -170,7 +185,10 @@ def diagnose(
         )
     else:
         verdict = Verdict(verdict="nothing", sentence="The data show nothing that the model lacks.", **common)
-    return Diagnosis(verdict, checks, bench, base, stages, current, start, predictions)
+    if doubts:
+        words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
+        verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
+    return Diagnosis(verdict, checks, bench, base, stages, named, current, start, predictions)
 
 
 def _number(interval: Interval) -> FittedNumber:
@@ -234,22 +252,26 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
     Args:
         diagnosis: what was found.
         base: file of the base scenario.
-        out: directory; made when it is not there.
+        out: directory; made when it is not there. Nothing is left in it when a file cannot be written.
+
+    Raises:
+        InputError: ``out`` cannot be written.
     """
     from hdsim.diagnose.add import scenario_text
     from hdsim.diagnose.record_out import side_by_side
     from hdsim.diagnose.report import write_report
 
     out = Path(out)
-    out.mkdir(parents=True, exist_ok=True)
-    if diagnosis.verdict.verdict in ("effect", "parameter"):
-        path = out / "found.yaml"
-        freedoms = diagnosis.refit.freedoms
-        text = scenario_text(
-            Path(base).resolve(), diagnosis.final.state, freedoms, diagnosis.start, out.resolve()
-        )
-        path.write_text(text, encoding="utf-8")
-        diagnosis.verdict.scenario = str(path)
-    side_by_side(diagnosis).save(out / "compared.mcap")
-    (out / "verdict.json").write_text(diagnosis.verdict.model_dump_json(indent=2), encoding="utf-8")
-    return write_report(diagnosis, out)
+    verdict = diagnosis.verdict
+    with staged(out) as stage:
+        # What an earlier diagnosis found must not stay beside this one's verdict.
+        (out / "found.yaml").unlink(missing_ok=True)
+        if verdict.verdict in ("effect", "parameter"):
+            state, freedoms = diagnosis.final.state, diagnosis.refit.freedoms
+            text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
+            (stage / "found.yaml").write_text(text, encoding="utf-8")
+            verdict.scenario = str(out / "found.yaml")
+        side_by_side(diagnosis).save(stage / "compared.mcap")
+        (stage / "verdict.json").write_text(verdict.model_dump_json(indent=2), encoding="utf-8")
+        report = write_report(diagnosis, stage)
+    return out / report.name

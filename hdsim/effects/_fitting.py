@@ -84,6 +84,7 @@ class Fitting:
         label: tells this way from the effect's others.
         needs: channels without which it cannot be told.
         turns: least travel of the wave generator, in turns, without which its trace looks like anything.
+        covered_by: numbers of a scenario that say the same: with all of them above zero the re-fit has had it.
         cumulative: a term has a meaning only on top of those before it, and adds to their fields.
     """
 
@@ -93,6 +94,7 @@ class Fitting:
     label: str = ""
     needs: tuple[str, ...] = ()
     turns: float = 0.0
+    covered_by: tuple[str, ...] = ()
     cumulative: bool = False
 
     def items(self, section: str) -> list[Any]:

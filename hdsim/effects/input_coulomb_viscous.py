@@ -33,7 +33,10 @@ class InputCoulombViscous(Effect):
         },
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting((Amplitude({"coulomb_nm": 0.032}), Amplitude({"viscous_nm_s_per_rad": 3.5e-4}))),
+        Fitting(
+            (Amplitude({"coulomb_nm": 0.032}), Amplitude({"viscous_nm_s_per_rad": 3.5e-4})),
+            covered_by=("drive.friction.coulomb_nm", "drive.friction.viscous_nm_s_per_rad"),
+        ),
     )
 
     coulomb_nm: float = Field(0.032, ge=0)

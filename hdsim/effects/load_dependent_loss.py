@@ -49,7 +49,9 @@ class LoadDependentLoss(Effect):
             "torsional_hysteresis_maxwell": "absent with the wave generator locked",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Amplitude({"coefficient": 0.03}),)),)
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Amplitude({"coefficient": 0.03}),), covered_by=("drive.friction.load_coefficient",)),
+    )
 
     coefficient: float = Field(0.03, ge=0, lt=1)
     """Share of the transmitted torque, reduced to the motor, that is lost on top of the drive's own, c_L."""
