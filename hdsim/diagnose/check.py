@@ -10,12 +10,13 @@ Statistical Association 69:383).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from hdsim.diagnose.measured import Array, Mask, Record
+from hdsim.diagnose.measured import LARGEST, Array, Mask, Record
 
 Severity = Literal["info", "warning", "error"]
 
@@ -25,8 +26,13 @@ SPIKE_DEVIATIONS = 12.0
 SPIKE_WINDOW = 11
 #: Longest run of samples that still is a spike.
 LONGEST_SPIKE = 4
-#: Steps of time longer than this many medians are gaps.
-GAP = 3.0
+#: Steps of time longer than this many medians are gaps; from this many seconds on nobody knows the motion.
+GAP, LONGEST_GAP_S = 3.0, 1.0
+#: Sampling slower than this says little of a drive, Hz.
+SLOWEST_HZ = 10.0
+#: Input speed beyond which a record is not believed, rev/min: twice the 14000 that the smallest sizes are
+#: rated for with oil (Harmonic Drive, CSG/CSF catalogue, rating tables).
+FASTEST_RPM = 30000.0
 
 
 @dataclass(frozen=True)
@@ -36,7 +42,7 @@ class Problem:
     Attributes:
         record: name of the record.
         channel: name of the channel, or ``time``.
-        kind: gap, missing, spikes, dead, saturated, clock, unit, sign, ratio, side, channel.
+        kind: gap, missing, spikes, dead, saturated, clock, unit, sign, ratio, side, drive.
         severity: an ``error`` stops a diagnosis.
         message: what was found, with the numbers that say so.
         count: samples concerned.
@@ -74,6 +80,7 @@ def check_record(record: Record, ratio: float) -> Check:
     _clock(record, found)
     for channel, values in record.channels.items():
         _channel(record, channel, values, found)
+    _still(record, found)
     _units(record, ratio, found)
     return found
 
@@ -94,17 +101,22 @@ def _clock(record: Record, found: Check) -> None:
     gaps = steps > GAP * period
     if gaps.any():
         where = ", ".join(f"{t:.3g} s" for t in record.time[:-1][gaps][:3])
-        found.problems.append(
-            Problem(
-                record.name,
-                "time",
-                "gap",
-                "warning",
-                f"{int(gaps.sum())} gaps longer than {GAP:g} samples, the longest "
-                f"{steps.max():.3g} s (at {where})",
-                int(gaps.sum()),
-            )
+        message = (
+            f"{int(gaps.sum())} gaps longer than {GAP:g} samples, the longest {steps.max():.3g} s ({where})"
         )
+        severity: Severity = "warning"
+        if steps.max() > LONGEST_GAP_S:
+            severity = "error"
+            message += (
+                f"; nothing tells the motion across more than {LONGEST_GAP_S:g} s: cut the recording there"
+            )
+        found.problems.append(Problem(record.name, "time", "gap", severity, message, int(gaps.sum())))
+    if period > 1.0 / SLOWEST_HZ:
+        message = (
+            f"one sample every {period:.3g} s over {record.duration_s:.4g} s: slower than {SLOWEST_HZ:g} Hz, "
+            "friction and ripple average out. Is the unit of time right (ms for s)?"
+        )
+        found.problems.append(Problem(record.name, "time", "clock", "error", message))
     jitter = float(np.median(np.abs(steps[~gaps] - period)) / 0.6745)
     if jitter > 0.05 * period:
         message = f"sampling time {period:.4g} s jitters by {jitter:.2g} s"
@@ -119,10 +131,12 @@ def _channel(record: Record, channel: str, values: Array, found: Check) -> None:
     missing = int((~trusted).sum())
     if missing:
         severity: Severity = "error" if missing > 0.5 * len(values) else "warning"
-        add("missing", severity, f"{missing} of {len(values)} samples are missing or not a number", missing)
+        text = f"{missing} of {len(values)} samples are missing, not a number or beyond {LARGEST:g}"
+        add("missing", severity, text, missing)
     good = values[trusted]
     if len(good) < 20:
-        add("dead", "error", f"only {len(good)} valid samples")
+        if not missing:
+            add("dead", "error", f"only {len(good)} valid samples")
         return
     if np.ptp(good) == 0.0:
         severity = "info" if channel in ("load_torque", "temperature") else "warning"
@@ -141,18 +155,56 @@ def _channel(record: Record, channel: str, values: Array, found: Check) -> None:
         )
         record.trusted[channel] = trusted = trusted & ~spikes
         good = values[trusted]
-    for extreme, word in ((good.max(), "upper"), (good.min(), "lower")):
-        stuck = longest_run(values == extreme)
-        if stuck >= 10 and stuck > 0.002 * len(values) and (values == extreme).mean() < 0.9:
-            still = channel.endswith("angle") or channel.endswith("velocity")
-            if not still:
-                add(
-                    "saturated",
-                    "warning",
-                    f"stays at its {word} limit {extreme:.4g} for {stuck} samples",
-                    stuck,
-                )
+    if channel in ("motor_torque", "output_torque"):
+        stuck = saturated(values, trusted)
+        if stuck.any():
+            limits = " and ".join(f"{v:.4g}" for v in np.unique(values[stuck]))
+            count = int(stuck.sum())
+            severity = "error" if count > 0.5 * len(values) else "warning"
+            add(
+                "saturated",
+                severity,
+                f"stays at {limits} for {count} of {len(values)} samples; masked",
+                count,
+            )
+            record.trusted[channel] = trusted = trusted & ~stuck
     found.noise[channel] = noise_floor(values, trusted)
+
+
+def _still(record: Record, found: Check) -> None:
+    """Say so where nothing moves, or nothing that was measured answers the motion."""
+
+    def varies(channel: str) -> bool:
+        good = record.trusted[channel]
+        spread = float(np.std(record.channels[channel][good])) if good.sum() > 20 else 0.0
+        return spread > 1.5 * found.noise.get(channel, 0.0)
+
+    motions = ["motor_angle", "output_angle", "load_torque"]
+    answers = [
+        "motor_torque",
+        "output_torque",
+        *(["output_angle"] if "motor_angle" in record.channels else []),
+    ]
+    for group, what in ((motions, "nothing moves"), (answers, "nothing answers the motion")):
+        there = [c for c in group if c in record.channels]
+        # A group without a channel is for the plan to refuse, and one without samples has been refused.
+        if not any(record.trusted[c].sum() > 20 for c in there) or any(map(varies, there)):
+            continue
+        verb = "does not vary by more than its" if len(there) == 1 else "do not vary by more than their"
+        message = f"nothing can be learned: {what}, as {' and '.join(there)} {verb} noise"
+        found.problems.append(Problem(record.name, there[0], "dead", "error", message))
+        return
+
+
+def saturated(values: Array, trusted: Mask) -> Mask:
+    """Samples at the highest or lowest number of a channel that stays there for a while, shape (n,)."""
+    found = np.zeros(len(values), dtype=bool)
+    for extreme in (values[trusted].max(), values[trusted].min()):
+        there = values == extreme
+        run = longest_run(there)
+        if run >= 10 and run > 0.002 * len(values) and there.mean() < 0.9:
+            found |= there
+    return found
 
 
 def find_spikes(values: Array, trusted: Mask) -> Mask:
@@ -206,70 +258,104 @@ def slope(x: Array, y: Array) -> tuple[float, float]:
     return factor, 1.0 - float(np.sum((y - factor * x) ** 2)) / float(y @ y)
 
 
-#: What a factor between two channels that should agree may come from.
+#: What a factor between two numbers that should agree may come from: one of them is ...
 _FACTORS = {
-    180.0 / math.pi: "one of them is in degrees",
-    2.0 * math.pi: "one of them is in revolutions",
-    60.0 / (2.0 * math.pi): "one of them is in rev/min",
-    1000.0: "a factor of 1000 in a unit (ms for s, mN m for N m)",
+    180.0 / math.pi: "in degrees",
+    2.0 * math.pi: "in revolutions",
+    10800.0 / math.pi: "in arcmin",
+    648000.0 / math.pi: "in arcsec",
+    1000.0: "off by 1000 in its unit (ms for s, mN m for N m, mrad for rad)",
 }
+_RATES = _FACTORS | {60.0 / (2.0 * math.pi): "in rev/min"}
 
 
-def explain(factor: float, ratio: float) -> tuple[str, str] | None:
-    """Kind and likely cause of a factor that should be 1, or None when it is within 2 %."""
-    if abs(factor - 1.0) < 0.02:
+def explain(
+    factor: float, ratio: float, within: float = 0.02, factors: Mapping[float, str] = _FACTORS
+) -> tuple[str, str] | None:
+    """Kind and likely cause of a factor that should be 1, or None when it is.
+
+    Args:
+        factor: what was found.
+        ratio: the model's signed ratio.
+        within: relative distance at which two factors count as the same.
+        factors: what a factor may come from.
+
+    Returns:
+        The kind of a problem, and how a sentence ends that begins with "one of them is".
+    """
+    reach = math.log1p(within)
+
+    def away(value: float) -> float:
+        return abs(math.log(abs(factor / value)))
+
+    if factor > 0 and away(1.0) < reach:
         return None
-    sign = "and the sign is turned" if factor < 0 else ""
-    size = abs(factor)
-    if abs(size - 1.0) < 0.02:
-        return "sign", "the sign of one of them is turned"
-    causes = [("unit", value, text) for value, text in _FACTORS.items()]
-    causes.append(("side", abs(ratio), "one of them is on the other side of the gear"))
-    for kind, value, text in causes:
-        for candidate in (value, 1.0 / value):
-            if abs(size / candidate - 1.0) < 0.02:
-                return kind, f"{text} {sign}".strip()
-    return "ratio", f"the drive's ratio is another one, or a unit is wrong {sign}".strip()
+    causes = [("sign", -1.0, "")]
+    for value, text in factors.items():
+        causes += [("unit", sign * v, text) for v in (value, 1.0 / value) for sign in (1.0, -1.0)]
+    # A torque or an angle that is given at the other side carries the ratio's sign.
+    side = "at the other side of the gear"
+    causes += [("side", v, side) for r in (ratio, -ratio) for v in (r, 1.0 / r)]
+    same = [cause for cause in causes if cause[1] * factor > 0]
+    kind, value, text = min(same, key=lambda cause: away(cause[1]))
+    if away(value) >= reach:
+        kind, text = "ratio", "of another drive, or in a wrong unit"
+    turned = "with its sign turned" if factor * (ratio if kind == "side" else 1.0) < 0 else ""
+    return kind, " ".join(part for part in (text, turned) if part)
 
 
 def _units(record: Record, ratio: float, found: Check) -> None:
     """Compare channels that are tied by kinematics or by power."""
+    usable = {c for c, good in record.trusted.items() if good.sum() > 20}
+    moved = {c for c in usable if float(np.ptp(record.filled(c))) > 0}
 
-    def moved(channel: str) -> bool:
-        return channel in record.channels and float(np.ptp(record.filled(channel))) > 0
-
-    def suspect(channel: str, factor: float, cause: tuple[str, str], expected: str) -> None:
-        message = f"is {factor:.4g} times {expected}: {cause[1]}"
+    def suspect(channel: str, factor: float, cause: tuple[str, str], expected: str, more: str = "") -> None:
+        message = f"is {factor:.4g} times {expected}{more}: one of them is {cause[1]}"
         found.problems.append(Problem(record.name, channel, cause[0], "error", message))
 
-    usable = {c for c in record.channels if record.trusted[c].sum() > 20}
-    if {"motor_angle", "output_angle"} <= usable and moved("motor_angle") and moved("output_angle"):
+    if record.ratio is not None and abs(record.ratio / ratio - 1.0) > 0.01:
+        message = f"its mapping has the ratio {record.ratio:g}, the model {ratio:g}: another drive, or sign"
+        found.problems.append(Problem(record.name, "ratio", "ratio", "error", message))
+    if {"motor_angle", "output_angle"} <= moved:
         motor, output = record.filled("motor_angle"), record.filled("output_angle")
         factor, explained = slope(motor / ratio, output)
         # A drive that only winds up (output locked) says nothing about the ratio.
         if explained > 0.95 and (cause := explain(factor, ratio)):
-            suspect("output_angle", factor, cause, f"motor_angle / {ratio:g}")
+            measured = f" (motor over output angle is {ratio / factor:.4g}, the model's ratio {ratio:g})"
+            suspect("output_angle", factor, cause, f"motor_angle / {ratio:g}", measured)
     for side in ("motor", "output"):
         angle, velocity = f"{side}_angle", f"{side}_velocity"
-        if {angle, velocity} <= usable and moved(angle) and moved(velocity):
+        if {angle, velocity} <= moved:
             travelled = np.concatenate(
                 [[0.0], np.cumsum(np.diff(record.time) * _midpoints(record.filled(velocity)))]
             )
             factor, explained = slope(record.filled(angle), travelled)
-            if explained > 0.95 and (cause := explain(factor, ratio)):
+            if explained > 0.95 and (cause := explain(factor, ratio, factors=_RATES)):
                 suspect(velocity, factor, cause, f"the rate of {angle}")
-    if {"motor_torque", "output_torque"} <= usable and moved("motor_torque") and moved("output_torque"):
+    if {"motor_torque", "output_torque"} <= moved:
         factor, explained = slope(record.filled("output_torque") / ratio, record.filled("motor_torque"))
-        if explained > 0.5:
-            if factor < 0:
-                suspect(
-                    "motor_torque",
-                    factor,
-                    ("sign", "the sign of one of them is turned"),
-                    "output_torque / ratio",
-                )
-            elif not 0.2 < factor < 5 and (cause := explain(factor, ratio)):
-                suspect("motor_torque", factor, cause, f"output_torque / {ratio:g}")
+        # Friction, inertia and efficiency stand between the two: only gross factors tell.
+        if explained > 0.5 and not 0.2 < factor < 5:
+            cause = explain(factor, ratio, 0.3) or ("unit", "in a wrong unit")
+            suspect("motor_torque", factor, cause, f"output_torque / {ratio:g}")
+    if found.errors:
+        return
+    for channel, size in (("motor_angle", 1.0), ("output_angle", abs(ratio))):
+        speed = size * fastest(record, channel) * 30.0 / math.pi if channel in moved else 0.0
+        if speed > FASTEST_RPM:
+            message = (
+                f"its motion makes the motor run at {speed:.3g} rev/min; strain wave gears are rated up to "
+                f"14000, {FASTEST_RPM:g} is the most that is believed: a wrong unit, side or clock"
+            )
+            found.problems.append(Problem(record.name, channel, "unit", "error", message))
+
+
+def fastest(record: Record, channel: str) -> float:
+    """Speed of an angle that is exceeded 1 % of the time, rad/s, from its travel over 20 ms."""
+    values = record.filled(channel)
+    reach = min(max(1, round(0.02 / record.period_s)), len(values) - 1)
+    rates = np.abs(values[reach:] - values[:-reach]) / (record.time[reach:] - record.time[:-reach])
+    return float(np.quantile(rates, 0.99))
 
 
 def _midpoints(values: Array) -> Array:

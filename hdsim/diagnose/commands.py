@@ -11,13 +11,15 @@ if TYPE_CHECKING:
     from hdsim.diagnose.workflow import Diagnosis
 
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+#: A ROS 2 bag is a folder.
+_DATA = click.Path(exists=True, path_type=Path)
 
 
 @click.command()
-@click.argument("measured", nargs=-1, required=True, type=_FILE)
+@click.argument("measured", nargs=-1, required=True, type=_DATA)
 @click.option("--model", required=True, type=_FILE, help="Scenario of the model.")
 @click.option("--mapping", type=_FILE, help="What the columns mean; a log of hdsim needs none.")
-@click.option("--holdout", multiple=True, type=_FILE, help="Records that only the proof sees.")
+@click.option("--holdout", multiple=True, type=_DATA, help="Records that only the proof sees.")
 @click.option(
     "--out", required=True, type=click.Path(file_okay=False, path_type=Path), help="Where to write."
 )
@@ -43,10 +45,17 @@ def diagnose(
     """
     import hdsim
     from hdsim.diagnose.measured import record_from
+    from hdsim.diagnose.staging import staged
     from hdsim.diagnose.workflow import diagnose as run
     from hdsim.diagnose.workflow import save
 
+    for path in holdout:
+        if path.resolve() in {p.resolve() for p in measured}:
+            raise hdsim.InputError(f"--holdout: {path} is also a measured record, which the fits see")
     scenario = hdsim.load_scenario(model)
+    # Better known now than after the minutes of a diagnosis.
+    with staged(out, keep=False):
+        pass
     records, held = (
         [record_from(hdsim.import_recording(path, mapping), path.name) for path in paths]
         for paths in (measured, holdout)

@@ -187,6 +187,8 @@ def order_lines(bench: Bench, residuals: list[Array], channel: str, most: int = 
     step = max(0.4 / turns, DENSE_ORDER / 600)
     orders = np.arange(max(0.5, 1.5 / turns), min(DENSE_ORDER, highest), step)
     orders = np.unique(np.concatenate([orders, np.arange(1.0, int(highest) + 1)]))
+    if not len(orders):
+        return []  # too fast for the sampling to see any order
     # A random part of the samples: taking every k-th would alias the high orders.
     if len(theta) > SPECTRUM_SAMPLES:
         part = np.sort(np.random.default_rng(0).choice(len(theta), SPECTRUM_SAMPLES, replace=False))

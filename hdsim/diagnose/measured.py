@@ -27,8 +27,15 @@ CHANNELS = {
     "load_torque": "N m",
     "temperature": "degC",
 }
-#: Fewest samples that a diagnosis can work with.
-FEWEST_SAMPLES = 200
+#: Fewest samples, and shortest record, that a diagnosis can work with.
+FEWEST_SAMPLES, SHORTEST_S = 200, 0.5
+_WHY_SO_LONG = (
+    "its start is not compared, a third is held out for the proof, and the rest is cut into 18 blocks"
+)
+#: Least part of its samples that a record has to have, of those that its rate and its duration promise.
+SPARSEST = 0.1
+#: Larger numbers than this, in SI units, are no measurement of a drive, and their squares overflow.
+LARGEST = 1e12
 
 
 @dataclass
@@ -40,16 +47,18 @@ class Record:
         time: shape (n,), s, from 0, strictly increasing.
         channels: shape (n,) each, SI units, by the contract's names.
         trusted: shape (n,) each: samples that are neither missing nor spikes.
+        ratio: the ratio by which an import brought numbers to the other side of the gear, where it did.
     """
 
     name: str
     time: Array
     channels: dict[str, Array]
     trusted: dict[str, Mask] = field(default_factory=dict)
+    ratio: float | None = None
 
     def __post_init__(self) -> None:
         for channel, values in self.channels.items():
-            self.trusted.setdefault(channel, np.isfinite(values))
+            self.trusted.setdefault(channel, np.isfinite(values) & (np.abs(values) < LARGEST))
 
     @property
     def duration_s(self) -> float:
@@ -73,14 +82,28 @@ def record_from(recording: Recording, name: str = "") -> Record:
     """The contract's channels of a recording; a log of a simulated run gives what its sensors read.
 
     Raises:
-        InputError: too few samples, a clock that does not run, or no channel of the contract.
+        InputError: too short, a clock that does not run, or no channel of the contract.
     """
     time = np.asarray(recording.time, dtype=float)
     name = name or recording.metadata.get("scenario_name", "") or "measured"
-    if len(time) < FEWEST_SAMPLES:
-        raise InputError(f"{name}: {len(time)} samples, a diagnosis needs at least {FEWEST_SAMPLES}")
     if not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0):
         raise InputError(f"{name}: time must be finite and strictly increasing")
+    lasts = float(np.ptp(time)) if len(time) else 0.0
+    if len(time) < FEWEST_SAMPLES or lasts < SHORTEST_S:
+        raise InputError(
+            f"{name}: {len(time)} samples over {lasts:.3g} s; a diagnosis needs at least {FEWEST_SAMPLES} "
+            f"samples over {SHORTEST_S:g} s, because {_WHY_SO_LONG}. Is the unit of its time right?"
+        )
+    steps = np.diff(time)
+    promised = lasts / float(np.median(steps))
+    if len(time) < SPARSEST * promised:
+        longest = int(np.argmax(steps))
+        raise InputError(
+            f"{name}: {len(time)} samples are {100 * len(time) / promised:.2g} % of what their rate and "
+            f"{lasts:.4g} s promise (allowed: at least {100 * SPARSEST:g} %); the longest gap, "
+            f"{steps[longest]:.4g} s, begins at {time[longest] - time[0]:.4g} s: cut the recording there and "
+            "give the parts as records"
+        )
     channels = {}
     for channel in CHANNELS:
         source = f"measured_{channel}" if f"measured_{channel}" in recording else channel
@@ -88,4 +111,11 @@ def record_from(recording: Recording, name: str = "") -> Record:
             channels[channel] = np.asarray(recording[source], dtype=float)
     if not channels:
         raise InputError(f"{name}: no channel of {', '.join(CHANNELS)}; found {', '.join(recording)}")
-    return Record(name, time - time[0], channels)
+    return Record(name, time - time[0], channels, ratio=_ratio(recording))
+
+
+def _ratio(recording: Recording) -> float | None:
+    try:
+        return float(recording.metadata["ratio"])
+    except (KeyError, ValueError):
+        return None

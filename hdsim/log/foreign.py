@@ -86,7 +86,9 @@ def read(path: Path, mapping: Mapping, origins: Sequence[Origin]) -> dict[str, S
         if tabular and origin.column is None:
             raise InputError(f"{path}: a {kind} file has columns; the mapping names topic {origin.topic!r}")
         if not tabular and origin.topic is None:
-            raise InputError(f"{path}: it has topics; the mapping names column {origin.column!r}")
+            raise InputError(
+                f"{path}: read as {kind} it has topics; the mapping names column {origin.column!r}"
+            )
     if tabular:
         names = list(dict.fromkeys(str(origin.column) for origin in origins))
         table = _read_csv(path, mapping, names) if kind == "csv" else _read_parquet(path, names)
@@ -171,8 +173,12 @@ def _read_topics(
     rows: dict[str, list[list[float]]] = {topic: [] for topic in by_topic}
     stamps: dict[str, list[tuple[int, int, int | None]]] = {topic: [] for topic in by_topic}
     for topic, logged, published, decode in messages(path, set(by_topic)):
-        message = decode()
         place = f"{path}: {topic}"
+        try:
+            message = decode()
+        except Exception as error:  # whatever a decoder says of bytes that are not its own
+            number = len(rows[topic]) + 1
+            raise InputError(f"{place}: message {number} cannot be decoded: {error}") from None
         rows[topic].append([_pick(message, origin, place) for origin in by_topic[topic]])
         stamps[topic].append((logged, published, _header_time(message)))
     found = {}
@@ -243,8 +249,11 @@ def _pick(message: Any, origin: Origin, place: str) -> float:
 
 
 def _mcap_messages(path: Path, topics: set[str]) -> Iterator[_Message]:
+    import struct
+
     from mcap.exceptions import McapError
     from mcap.reader import make_reader
+    from zstandard import ZstdError
 
     decoders: dict[int, Callable[[bytes], Any]] = {}
     try:
@@ -265,8 +274,9 @@ def _mcap_messages(path: Path, topics: set[str]) -> Iterator[_Message]:
                     message.publish_time,
                     lambda decode=decode, body=body: decode(body),  # type: ignore[misc]
                 )
-    except (McapError, OSError) as error:
-        raise InputError(f"{path}: cannot be read as MCAP: {error or type(error).__name__}") from None
+    except (McapError, ZstdError, OSError, EOFError, RuntimeError, struct.error) as error:
+        words = str(error) or type(error).__name__
+        raise InputError(f"{path}: cannot be read as MCAP, it is cut off or damaged: {words}") from None
 
 
 def _decoder(path: Path, channel: Any, schema: Any) -> Callable[[bytes], Any]:

@@ -132,7 +132,9 @@ class _Import:
         place = f"{self.path}: {topic}" if topic else str(self.path)
         count = len(next(iter(samples.values.values())))
         if count < 2:
-            raise InputError(f"{place}: it is empty" if not count else f"{place}: one sample is no recording")
+            raise InputError(
+                f"{place}: " + ("one sample is no recording" if count else "it is empty: no sample")
+            )
         if clock.rate_hz is not None:
             return np.arange(count) / clock.rate_hz
         if recorded is not None:

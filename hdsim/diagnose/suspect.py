@@ -1,0 +1,162 @@
+"""Suspicions that need the model: wrong scales, and logs of another drive, before either is sold as physics.
+
+Kinematics tell a wrong unit only where two channels show the same motion (`hdsim.diagnose.check`). A torque
+that stands alone is held against the model: its regression on the prediction gives one factor, and a factor
+near 1000, 180/pi, the ratio or -1 has a likely cause. The re-fitted numbers are held against the range in
+which a drive of the same size lies.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.check import Problem, explain, slope
+from hdsim.diagnose.freedom import State
+from hdsim.diagnose.measured import Array, Mask
+from hdsim.diagnose.predict import Predictor
+from hdsim.diagnose.refit import Refit
+
+#: Factor between measurement and model beyond which a number is suspect, by the last part of its name.
+#: Friction and damping differ more between two drives of a size, and with grease and temperature; a fitted
+#: inertia is bent by friction that the model lacks, so its own part of the torque is looked at instead.
+FAR = {
+    "channel": 4.0,
+    "motor_torque_gain": 2.0,
+    "coulomb_nm": 15.0,
+    "viscous_nm_s_per_rad": 15.0,
+    "load_coefficient": 15.0,
+    "damping_nm_s_per_rad": 15.0,
+    "motor_kg_m2": 15.0,
+    "inertia_kg_m2": 15.0,
+}
+FAR_OTHERWISE = 5.0
+#: Share of a channel's variation that one factor must explain to be evidence, and how near a cause must be.
+EXPLAINED, NEAR = 0.5, 0.25
+#: The same for the part that follows the acceleration.
+EXPLAINED_PART = 0.1
+#: A re-fit tells something when it leaves less than this part of a gap; a channel is missed when this many
+#: times its variation is left.
+CLOSED, MISSED = 0.5, 3.0
+#: A held-out record is another drive's when its gap is this many times that of the others, and this part of
+#: what varies.
+ANOTHER, PART = 5.0, 0.3
+
+
+def suspicions(bench: Bench, base: Refit, start: State) -> list[Problem]:
+    """Warnings about data that do not look like this drive's.
+
+    Args:
+        bench: the measured series.
+        base: the re-fit.
+        start: the model as given.
+    """
+    if bench.training < len(bench.predictors):
+        before, after = (
+            bench.predict(state.candidate(), state.gain, everything=True) for state in (start, base.fit.state)
+        )
+    else:
+        before, after = base.before, base.fit.predictions
+    scales = _scales(bench, before)
+    return [*scales, *_numbers(bench, base, after, scales), *_other_holdouts(bench, after)]
+
+
+def _scales(bench: Bench, before: list[Array]) -> list[Problem]:
+    """Torques that are the model's prediction, or its inertia's part, times a factor that is far from 1."""
+    found = []
+    for series, predicted in zip(bench.series, before, strict=True):
+        predictor = bench.predictors[series.record]
+        rows = series.train | series.hold
+        if not len(predicted) or series.channel == "output_angle" or rows.sum() < 20:
+            continue
+        whole = slope(predicted[rows], series.measured[rows])
+        part = _inertia(predictor, rows, series.measured, predicted)
+        for what, (factor, explained), least in (
+            ("what the model predicts", whole, EXPLAINED),
+            ("the part of the model's prediction that follows the acceleration", part, EXPLAINED_PART),
+        ):
+            if explained < least or 1.0 / FAR["channel"] < factor < FAR["channel"]:
+                continue
+            kind, text = explain(factor, predictor.ratio, NEAR) or ("unit", "in a wrong unit")
+            message = (
+                f"is {factor:.3g} times {what} (this explains {100 * explained:.0f} % of its variation), "
+                f"as if it, its motion or its load were {text}"
+            )
+            found.append(Problem(predictor.record.name, series.channel, kind, "warning", message))
+            break
+    return found
+
+
+def _inertia(predictor: Predictor, rows: Mask, measured: Array, predicted: Array) -> tuple[float, float]:
+    """Ratio of the inertias that a measured and a predicted torque show, and the measured one's share.
+
+    Both are regressed on acceleration, velocity, its sign and gravity's sine and cosine.
+    """
+    turned = predictor.motor_angle[rows] / predictor.ratio
+    velocity = predictor.motor_velocity[rows]
+    others = [velocity, np.sign(velocity), np.cos(turned), np.sin(turned), np.ones_like(velocity)]
+    q, _ = np.linalg.qr(np.column_stack(others))
+    acceleration = predictor.motor_acceleration[rows]
+    alone = acceleration - q @ (q.T @ acceleration)
+    power, variation = float(alone @ alone), float(np.sum((measured[rows] - measured[rows].mean()) ** 2))
+    ours, theirs = float(alone @ measured[rows]), float(alone @ predicted[rows])
+    if power <= 1e-9 * float(acceleration @ acceleration) or variation == 0.0 or theirs == 0.0:
+        return math.nan, 0.0
+    return ours / theirs, ours**2 / power / variation
+
+
+def _numbers(bench: Bench, base: Refit, after: list[Array], scales: list[Problem]) -> list[Problem]:
+    """Fitted numbers far from the model's, and channels that the re-fitted model misses altogether."""
+    closed, worse = False, []
+    for series, first, last in zip(bench.series, base.before, after, strict=True):
+        if not series.train.any():
+            continue
+        rests = [float(np.std((series.measured - values)[series.train])) for values in (first, last)]
+        varies = float(np.std(series.measured[series.train]))
+        closed |= rests[1] < CLOSED * rests[0]
+        # An angle's variation is mostly the ratio's, which the check has looked at.
+        if not scales and series.channel != "output_angle" and rests[1] > MISSED * varies:
+            worse.append(f"{series.channel} is missed by {rests[1] / varies:.2g} times its own variation")
+    far = []
+    for free, theta in zip(base.fit.frees, base.fit.theta, strict=True):
+        limit = FAR.get(free.name.rpartition(".")[2], FAR_OTHERWISE)
+        # A number that closes no gap has only been bent by something that is missing.
+        if closed and abs(theta) > math.log(limit):
+            bound = ", the bound of the search" if abs(theta) > 2.99 else ""
+            far.append(f"{free.name} is {math.exp(theta):.3g} times the model's{bound}")
+    if not far and not worse:
+        return []
+    listed = "; ".join([*far, *worse])
+    message = f"after the re-fit {listed}: a log of another drive or load, or a wrong unit"
+    record = bench.predictors[0].record.name
+    return [Problem(record, "model", "drive", "warning", message)]
+
+
+def _other_holdouts(bench: Bench, after: list[Array]) -> list[Problem]:
+    """Held-out records that the model fitted to the others misses by far more than those."""
+    found = []
+    rests: dict[str, float] = {}
+    for series, predicted in zip(bench.series, after, strict=True):
+        own = series.record >= bench.training
+        rows = series.hold if own else series.train
+        if not len(predicted) or not rows.any():
+            continue
+        rest = float(np.std((series.measured - predicted)[rows]))
+        if not own:
+            rests[series.channel] = max(rest, rests.get(series.channel, 0.0))
+            continue
+        predictor = bench.predictors[series.record]
+        values = series.measured
+        if series.channel == "output_angle":
+            values = values - predictor.motor_angle / predictor.ratio
+        varies = float(np.std(values[rows]))
+        others = max(rests.get(series.channel, math.inf), series.noise)
+        if rest > ANOTHER * others and rest > PART * varies:
+            message = (
+                f"the re-fitted model misses it by {rest:.3g}, {rest / others:.2g} times as much as the "
+                "records that it was fitted to: a holdout of another drive or load"
+            )
+            found.append(Problem(predictor.record.name, series.channel, "drive", "warning", message))
+    return found
