@@ -37,6 +37,11 @@ class Setup:
         return self.motion == "locked"
 
     @property
+    def algebraic_sign(self) -> bool:
+        """Whether friction changes sign by another formula than the model's; only where noise hides that."""
+        return self.drive.algebraic_sign and not self.locked and self.noise >= 0.6
+
+    @property
     def text(self) -> str:
         """In words."""
         load = "locked" if self.locked else "arm" if self.gravity else "inertia"
@@ -74,7 +79,7 @@ def numbers(setup: Setup, changes: dict[str, float]) -> Numbers:
         "damping": d.damping, "coulomb": d.coulomb, "viscous": d.viscous, "load_loss": d.load_loss,
         "arm": d.arm if setup.gravity and not setup.locked else 0.0,
         "sign_speed": LOCKED_SIGN_SPEED if setup.locked else SIGN_SPEED,
-        "algebraic_sign": float(d.algebraic_sign and not setup.locked), "locked": float(setup.locked),
+        "algebraic_sign": float(setup.algebraic_sign), "locked": float(setup.locked),
     }  # fmt: skip
     nominal |= dict.fromkeys(setup.lacks, 0.0)
     return Numbers(**{name: float(value) for name, value in (nominal | changes).items()})

@@ -10,8 +10,8 @@ SAMPLE = (
     "parameter/load-dependent loss/0",
     "clear/output encoder delay/0",
     "clear/unbalance/0",
-    "clear/output_eccentricity/0",
-    "pair/lugre_friction + wave_generator_eccentricity/2",
+    "clear/load_side_friction/0",
+    "pair/unbalance + input_coulomb_viscous/0",
     "outside/drifting torque/0",
 )
 
