@@ -147,8 +147,9 @@ def fit(
     chosen = list(frees)
     undetermined: list[Free] = []
     ties: dict[str, list[str]] = {}
+    power = math.nan
     if prune and chosen:
-        chosen, undetermined, ties = _determined(bench, state, chosen, held_effects, blocks, theta)
+        chosen, undetermined, ties, power = _determined(bench, state, chosen, held_effects, blocks, theta)
     vector = Vector(state, tuple(chosen), held_effects)
     x0 = vector.start(theta)
     first = vector.state(x0)
@@ -157,7 +158,9 @@ def fit(
         predictions = bench.predict(state.candidate(), state.gain)
         empty = np.zeros((len(start), 0))
         return Fit(state, [], x0, np.zeros((0, 0)), predictions, empty, undetermined, ties)
-    worth = 1.0 / math.sqrt(correlation(start, blocks) * max(float(np.mean(start**2)), 1e-30))
+    if math.isnan(power):
+        power = correlation(start, blocks) * max(float(np.mean(start**2)), 1e-30)
+    worth = 1.0 / math.sqrt(power)
     priors, centre = vector.priors(), vector.start()
     centre[len(chosen) :] = np.where(
         np.isfinite(vector.lower()[len(chosen) :]) & (priors[len(chosen) :] == SHAPE_PRIOR),
@@ -264,8 +267,10 @@ def _determined(
     held_effects: int,
     blocks: NDArray[np.int64],
     theta: Mapping[str, float] | None,
-) -> tuple[list[Free], list[Free], dict[str, list[str]]]:
+) -> tuple[list[Free], list[Free], dict[str, list[str]], float]:
     """Split the numbers into those that the data determine and the others, with what each is tied to.
+
+    Also returns what one independent sample of the residual counts, once a step of the fit is taken.
 
     The scaled Jacobian's singular values say how many directions the data see; the number with the largest
     share in an unseen one is dropped, one after the other.
@@ -275,6 +280,9 @@ def _determined(
     columns = sensitivities(bench, vector, x0)
     first = vector.state(x0)
     rest = _stacked(bench, bench.predict(first.candidate(), first.gain))
+    # What one step of the fit takes away is no noise, however far off the start is.
+    step, *_ = np.linalg.lstsq(columns * vector.priors(), rest, rcond=1e-6)
+    rest = rest - columns * vector.priors() @ step
     power = max(float(np.mean(rest**2)), 1e-30) * correlation(rest, blocks)
     priors = vector.priors()
     kept = list(range(len(frees)))
@@ -298,7 +306,7 @@ def _determined(
             if k != worst and abs(weakest[k]) > 0.3 and np.linalg.norm(scaled_columns[:, worst]) > 2
         ]
         kept.pop(worst)
-    return [frees[k] for k in kept], dropped, ties
+    return [frees[k] for k in kept], dropped, ties, power
 
 
 def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:

@@ -84,7 +84,7 @@ class Fitting:
         label: tells this way from the effect's others.
         needs: channels without which it cannot be told.
         turns: least travel of the wave generator, in turns, without which its trace looks like anything.
-        covered_by: numbers of a scenario that say the same: with all of them above zero the re-fit has had it.
+        covered_by: numbers of a scenario that say the same: where all are above zero the re-fit has had it.
         cumulative: a term has a meaning only on top of those before it, and adds to their fields.
     """
 
