@@ -10,7 +10,7 @@ SAMPLE = (
     "parameter/load-dependent loss/0",
     "clear/output encoder delay/0",
     "clear/unbalance/0",
-    "clear/load_side_friction/0",
+    "missing/load_side_friction, no motor angle/0",
     "pair/unbalance + input_coulomb_viscous/0",
     "outside/drifting torque/0",
 )
