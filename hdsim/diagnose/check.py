@@ -176,8 +176,10 @@ def _still(record: Record, found: Check) -> None:
 
     def varies(channel: str) -> bool:
         good = record.trusted[channel]
-        spread = float(np.std(record.channels[channel][good])) if good.sum() > 20 else 0.0
-        return spread > 1.5 * found.noise.get(channel, 0.0)
+        values = record.channels[channel][good]
+        if len(values) < 20 or np.ptp(values) == 0.0:
+            return False
+        return float(np.std(values)) > 1.5 * found.noise.get(channel, 0.0)
 
     motions = ["motor_angle", "output_angle", "load_torque"]
     answers = [

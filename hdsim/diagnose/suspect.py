@@ -81,8 +81,8 @@ def _scales(bench: Bench, before: list[Array]) -> list[Problem]:
                 continue
             kind, text = explain(factor, predictor.ratio, NEAR) or ("unit", "in a wrong unit")
             message = (
-                f"is {factor:.3g} times {what} (this explains {100 * explained:.0f} % of its variation), "
-                f"as if it, its motion or its load were {text}"
+                f"is {float(f'{factor:.3g}'):g} times {what} (this explains {100 * explained:.0f} % of its "
+                f"variation), as if it, its motion or its load were {text}"
             )
             found.append(Problem(predictor.record.name, series.channel, kind, "warning", message))
             break

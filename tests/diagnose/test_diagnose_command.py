@@ -40,4 +40,5 @@ def test_a_log_in_which_nothing_moves_is_refused_with_the_reason(tmp_path):
     arguments = [str(still), "--model", str(tmp_path / "rigid.yaml"), "--out", str(tmp_path / "out")]
     result = CliRunner().invoke(diagnose, arguments, standalone_mode=False)
     assert isinstance(result.exception, hdsim.InputError)
-    assert "nothing can be predicted" in str(result.exception)
+    assert "nothing can be learned" in str(result.exception)
+    assert "motor_torque does not vary" in str(result.exception)
