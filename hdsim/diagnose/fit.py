@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.freedom import Added, Free, Interval, State, scaled, signed
+from hdsim.diagnose.freedom import Added, Free, Interval, State, ceilings, scaled, signed
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
 
@@ -102,7 +102,7 @@ class Vector:
         """Upper bounds, shape (p,)."""
         bounds = [3.0] * len(self.frees)
         for added in self.base.added[self.first :]:
-            bounds += [math.inf] * len(added.coefficients)
+            bounds += ceilings(added)
             bounds += [math.log(shape) + 3.0 for shape in added.shapes]
         return np.array(bounds)
 
@@ -151,7 +151,7 @@ def fit(
     if prune and chosen:
         chosen, undetermined, ties, power = _determined(bench, state, chosen, held_effects, blocks, theta)
     vector = Vector(state, tuple(chosen), held_effects)
-    x0 = vector.start(theta)
+    x0 = np.minimum(vector.start(theta), vector.upper())
     first = vector.state(x0)
     start = _stacked(bench, bench.predict(first.candidate(), first.gain))
     if len(x0) == 0:

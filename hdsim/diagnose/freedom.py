@@ -107,6 +107,26 @@ def signed(fitting: Fitting, orders: int) -> list[bool]:
     return found
 
 
+def ceilings(added: Added) -> list[float]:
+    """Largest value that each coefficient may have, from the bounds of the effect's fields."""
+    fields = catalogue()[added.effect].model_fields
+    found: list[float] = []
+    for term, count in zip(added.fitting.terms, _counts(added), strict=True):
+        most = math.inf
+        for path, unit in term.units.items() if isinstance(term, Amplitude) else ():
+            for bound in fields[path].metadata if path in fields else ():
+                limit = getattr(bound, "le", getattr(bound, "lt", None))
+                most = most if limit is None else min(most, 0.999 * float(limit) / unit)
+        found += [most] * count
+    return found
+
+
+def _counts(added: Added) -> list[int]:
+    """Number of coefficients of each term."""
+    sizes = {Harmonic: 2, Periodic: 2 * len(added.orders)}
+    return [sizes.get(type(term), 1) for term in added.fitting.terms]
+
+
 @dataclass(frozen=True)
 class State:
     """A model in the course of a diagnosis.

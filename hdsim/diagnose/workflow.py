@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from hdsim.diagnose.refit import Refit, refit
 from hdsim.diagnose.search import Stage, search
 from hdsim.diagnose.staging import staged
 from hdsim.diagnose.suspect import suspicions
-from hdsim.diagnose.verdict import DataProblem, FittedNumber, Located, NamedEffect, Verdict
+from hdsim.diagnose.verdict import DataProblem, FittedNumber, Gap, Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Share of the weighed residual that must be structured for ``unknown``, and the part of all structure that
 #: the named effects must explain to be believed.
-STRUCTURED, ADEQUATE = 0.12, 0.7
+STRUCTURED, ADEQUATE = 0.12, 0.8
 #: Least relative fall of a held-out gap for the verdict ``parameter``.
 LEAST_FALL = 0.03
 
@@ -142,6 +142,10 @@ def diagnose(
     with step("prove", "proving on held-out data"):
         states = {"before": start, "refit": base.fit.state, "after": current.state}
         gap, predictions = gaps(bench, states)
+        if curve is not None and not _proved(gap):
+            # A curve that does not hold on data that it has not seen is none.
+            curve, current = None, base.fit
+            gap, predictions = gaps(bench, states | {"after": current.state})
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     moved = [i.name for i in base.intervals if i.moved]
@@ -189,6 +193,11 @@ def diagnose(
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
     return Diagnosis(verdict, checks, bench, base, stages, named, current, start, predictions)
+
+
+def _proved(gap: Mapping[str, Gap]) -> bool:
+    """Whether the held-out gaps fall on the whole, in units of what was there."""
+    return sum((g.after**2 - g.refit**2) / max(g.refit**2, 1e-300) for g in gap.values()) < 0
 
 
 def _number(interval: Interval) -> FittedNumber:
