@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -30,26 +30,13 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
     rng = np.random.default_rng(17)
     result = {}
     for channel in bench.channels:
-        own = [k for k, s in enumerate(bench.series) if s.channel == channel and s.hold.any()]
+        own = _held(bench, channel)
         if not own:
             continue
         numbers: dict[str, float] = {}
         intervals: dict[str, tuple[float, float]] = {}
         for stage, found in residuals.items():
-            powers, counts = [], []
-            for k in own:
-                series = bench.series[k]
-                rows = series.hold
-                blocks = series.block[rows] - series.block.min()
-                powers.append(np.bincount(blocks, found[k][rows] ** 2))
-                counts.append(np.bincount(blocks))
-            power, count = np.concatenate(powers), np.concatenate(counts)
-            power, count = power[count > 0], count[count > 0]
-            numbers[stage] = float(np.sqrt(power.sum() / count.sum()))
-            picks = rng.integers(0, len(power), size=(DRAWS, len(power)))
-            draws = np.sqrt(power[picks].sum(axis=1) / count[picks].sum(axis=1))
-            low, high = np.quantile(draws, [0.025, 0.975])
-            intervals[stage] = (float(low), float(high))
+            numbers[stage], intervals[stage] = held_out_gap(bench, channel, found, rng)
         series = bench.series[own[0]]
         result[channel] = Gap(
             before=numbers["before"],
@@ -61,6 +48,36 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
             intervals=intervals,
         )
     return result, predictions
+
+
+def _held(bench: Bench, channel: str) -> list[int]:
+    return [k for k, s in enumerate(bench.series) if s.channel == channel and s.hold.any()]
+
+
+def held_out_gap(
+    bench: Bench, channel: str, residuals: Sequence[Array], rng: np.random.Generator
+) -> tuple[float, tuple[float, float]]:
+    """Root mean square of a channel's residuals on held-out data, and its 95 % interval over blocks of time.
+
+    Args:
+        bench: the measured series.
+        channel: one that has held-out samples.
+        residuals: of every series, SI units.
+        rng: draws the blocks.
+    """
+    powers, counts = [], []
+    for k in _held(bench, channel):
+        series = bench.series[k]
+        rows = series.hold
+        blocks = series.block[rows] - series.block.min()
+        powers.append(np.bincount(blocks, residuals[k][rows] ** 2))
+        counts.append(np.bincount(blocks))
+    power, count = np.concatenate(powers), np.concatenate(counts)
+    power, count = power[count > 0], count[count > 0]
+    picks = rng.integers(0, len(power), size=(DRAWS, len(power)))
+    draws = np.sqrt(power[picks].sum(axis=1) / count[picks].sum(axis=1))
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return float(np.sqrt(power.sum() / count.sum())), (float(low), float(high))
 
 
 def variation(bench: Bench, index: int) -> float:
