@@ -311,9 +311,11 @@ def _units(record: Record, ratio: float, found: Check) -> None:
     usable = {c for c, good in record.trusted.items() if good.sum() > 20}
     moved = {c for c in usable if float(np.ptp(record.filled(c))) > 0}
 
-    def suspect(channel: str, factor: float, cause: tuple[str, str], expected: str, more: str = "") -> None:
-        message = f"is {factor:.4g} times {expected}{more}: one of them is {cause[1]}"
-        found.problems.append(Problem(record.name, channel, cause[0], "error", message))
+    def suspect(
+        channel: str, factor: float, cause: tuple[str, str], expected: str, severity: Severity = "error"
+    ) -> None:
+        message = f"is {factor:.4g} times {expected}: one of them is {cause[1]}"
+        found.problems.append(Problem(record.name, channel, cause[0], severity, message))
 
     if record.ratio is not None and abs(record.ratio / ratio - 1.0) > 0.01:
         message = f"its mapping has the ratio {record.ratio:g}, the model {ratio:g}: another drive, or sign"
@@ -324,22 +326,30 @@ def _units(record: Record, ratio: float, found: Check) -> None:
         # A drive that only winds up (output locked) says nothing about the ratio.
         if explained > 0.95 and (cause := explain(factor, ratio)):
             measured = f" (motor over output angle is {ratio / factor:.4g}, the model's ratio {ratio:g})"
-            suspect("output_angle", factor, cause, f"motor_angle / {ratio:g}", measured)
-    for side in ("motor", "output"):
-        angle, velocity = f"{side}_angle", f"{side}_velocity"
+            suspect("output_angle", factor, cause, f"motor_angle / {ratio:g}{measured}")
+    for side, other, gear in (("motor", "output", ratio), ("output", "motor", 1.0 / ratio)):
+        velocity, angle = f"{side}_velocity", f"{side}_angle"
+        if angle in moved:
+            gear = 1.0
+        else:
+            angle = f"{other}_angle"
         if {angle, velocity} <= moved:
             travelled = np.concatenate(
                 [[0.0], np.cumsum(np.diff(record.time) * _midpoints(record.filled(velocity)))]
             )
-            factor, explained = slope(record.filled(angle), travelled)
+            factor, explained = slope(gear * record.filled(angle), travelled)
             if explained > 0.95 and (cause := explain(factor, ratio, factors=_RATES)):
-                suspect(velocity, factor, cause, f"the rate of {angle}")
+                suspect(
+                    velocity, factor, cause, f"the rate of {angle}" + (f" x {gear:g}" if gear != 1 else "")
+                )
     if {"motor_torque", "output_torque"} <= moved:
         factor, explained = slope(record.filled("output_torque") / ratio, record.filled("motor_torque"))
-        # Friction, inertia and efficiency stand between the two: only gross factors tell.
+        # Friction and the motor's own inertia stand between the two: a gross factor only raises a suspicion,
+        # which the model will tell more of.
         if explained > 0.5 and not 0.2 < factor < 5:
             cause = explain(factor, ratio, 0.3) or ("unit", "in a wrong unit")
-            suspect("motor_torque", factor, cause, f"output_torque / {ratio:g}")
+            severity: Severity = "error" if factor < 0 else "warning"
+            suspect("motor_torque", factor, cause, f"output_torque / {ratio:g}", severity)
     if found.errors:
         return
     for channel, size in (("motor_angle", 1.0), ("output_angle", abs(ratio))):

@@ -85,6 +85,49 @@ def test_a_velocity_in_degrees_is_suspected():
     assert ("motor_velocity", "unit") in kinds(check_record(record(motor_velocity=velocity), RATIO))
 
 
+def test_a_velocity_of_the_side_whose_angle_is_not_there_is_checked_over_the_ratio():
+    t = np.arange(4000) / 1000.0
+    velocity = 60 * 2 * np.pi * 0.7 * np.cos(2 * np.pi * 0.7 * t) / RATIO
+    motor = record().channels["motor_angle"]
+    for factor, kinds in (
+        (1.0, []),
+        (30 / np.pi, ["unit"]),
+        (-1.0, ["sign"]),
+        (RATIO, ["side"]),
+        (1.6, ["ratio"]),
+    ):
+        r = Record("r", t, {"motor_angle": motor, "output_velocity": factor * velocity})
+        problems = check_record(r, RATIO).errors
+        assert [p.kind for p in problems if p.kind != "dead"] == kinds
+
+
+def test_torques_of_both_sides_tell_a_turned_sign_and_suspect_a_unit():
+    t = np.arange(4000) / 1000.0
+    torque = 20 * np.sin(2 * np.pi * 0.7 * t)
+    motor = torque / RATIO
+    for factor, severity, kind in (
+        (-1.0, "error", "sign"),
+        (1000.0, "warning", "unit"),
+        (RATIO, "error", "side"),
+    ):
+        r = record(output_torque=torque, motor_torque=factor * motor)
+        (problem,) = check_record(r, RATIO).problems
+        assert (problem.channel, problem.severity, problem.kind) == ("motor_torque", severity, kind)
+    # An unloaded drive carries little beside its motor's inertia.
+    (problem,) = check_record(record(output_torque=torque, motor_torque=8 * motor), RATIO).problems
+    assert problem.severity == "warning"
+
+
+def test_saturated_samples_are_masked_and_too_many_stop():
+    t = np.arange(4000) / 1000.0
+    torque = np.sin(2 * np.pi * 0.7 * t) + 1e-3 * np.random.default_rng(0).standard_normal(4000)
+    for limit, severity in ((0.9, "warning"), (0.4, "error")):
+        r = record(motor_torque=np.clip(torque, -limit, limit))
+        (problem,) = check_record(r, RATIO).problems
+        assert (problem.kind, problem.severity) == ("saturated", severity)
+        assert (~r.trusted["motor_torque"]).sum() == problem.count == (np.abs(torque) >= limit).sum()
+
+
 def test_right_factor_needs_no_explanation():
     assert explain(1.01, 100) is None
     assert explain(-1.0, 100) is not None
