@@ -1,4 +1,4 @@
-"""Figures of a diagnosis."""
+"""Figures of a diagnosis: the gap, measured against the model over time, the curve of what has no name."""
 
 from __future__ import annotations
 
@@ -6,187 +6,259 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.plot import style
+from hdsim.diagnose.prove import held_out_gap
+from hdsim.diagnose.wording import spoken, unit_of
+from hdsim.plot import style, units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.locate import Place
-    from hdsim.diagnose.measured import Array
-    from hdsim.diagnose.verdict import Verdict
+    from hdsim.diagnose.bench import Series
+    from hdsim.diagnose.further import CurveFound
+    from hdsim.diagnose.measured import Array, Mask
+    from hdsim.diagnose.verdict import Gap, Verdict
     from hdsim.diagnose.workflow import Diagnosis
 
 #: Most points of a drawn line.
-POINTS = 4000
+POINTS = 3000
+#: Width of every figure, inches: with these the text is as large as the page's.
+WIDTH = 10.6
+#: Samples, and least time in s, of the stretch that is shown closely.
+STRETCH_SAMPLES, STRETCH_S = 900, 0.8
+#: Colours of the models, and of what was measured.
+MEASURED, BEFORE, REFIT, STEP, AFTER = style.BLACK, style.ORANGE, "#E69F00", "#8FCFB8", style.GREEN
 
 
-def gap_figure(verdict: Verdict) -> Figure | None:
-    """Bars of the held-out gap before, after the re-fit and with the effects, as multiples of the noise."""
+Bars = list[tuple[str, float, tuple[float, float] | None, str]]
+"""Label, height, 95 % interval and colour of bars, SI units."""
+
+
+def gap_bars(diagnosis: Diagnosis) -> dict[str, Bars]:
+    """By channel, the held-out gap before, after the re-fit, after each effect of the search, and at the end."""
+    bench, verdict = diagnosis.bench, diagnosis.verdict
+    last = "with the curve" if verdict.curve is not None else "with the effect"
+    found: dict[str, Bars] = {}
+    for channel, gap in verdict.gap.items():
+        found[channel] = [
+            ("model as given", gap.before, gap.intervals.get("before"), BEFORE),
+            ("own numbers re-fitted", gap.refit, gap.intervals.get("refit"), REFIT),
+        ]
+    if len(verdict.effects) > 1:
+        last = f"with all {len(verdict.effects)} effects"
+        for stage in diagnosis.stages:
+            state = stage.named.fit.state if stage.named is not None else None
+            if state is None or len(state.added) >= len(verdict.effects):
+                continue
+            residuals = bench.residuals(bench.predict(state.candidate(), state.gain, everything=True))
+            label = "with " + ", ".join(spoken(added.effect) for added in state.added)
+            for channel, bars in found.items():
+                value, interval = held_out_gap(bench, channel, residuals, np.random.default_rng(17))
+                bars.append((label, value, interval, STEP))
+    if verdict.verdict == "effect" or verdict.curve is not None:
+        for channel, gap in verdict.gap.items():
+            found[channel].append((last, gap.after, gap.intervals.get("after"), AFTER))
+    return found
+
+
+def gap_figure(verdict: Verdict, found: dict[str, Bars]) -> Figure | None:
+    """Bars of the held-out gap (see `gap_bars`); dashed, the channel's noise."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     if not verdict.gap:
         return None
     with rc_context(style.STYLE):
-        figure = Figure(figsize=(9.0, 1.0 + 0.75 * len(verdict.gap)), layout="constrained")
-        axes = figure.subplots()
-        names = list(verdict.gap)
-        stages = (("before", style.GREY), ("refit", style.BLUE), ("after", style.ORANGE))
-        for k, (stage, colour) in enumerate(stages):
-            gaps = [verdict.gap[name] for name in names]
-            scale = [g.noise or g.variation or 1.0 for g in gaps]
-            values = np.array([getattr(g, stage) for g in gaps]) / scale
-            low = np.array([g.intervals.get(stage, (getattr(g, stage),) * 2)[0] for g in gaps]) / scale
-            high = np.array([g.intervals.get(stage, (getattr(g, stage),) * 2)[1] for g in gaps]) / scale
-            spread = np.abs(np.vstack([values - low, high - values]))
-            at = np.arange(len(names)) + 0.26 * (k - 1)
-            label = {"before": "before", "refit": "own numbers fitted", "after": "with what was found"}[stage]
-            axes.barh(at, values, 0.24, color=colour, xerr=spread, ecolor="#444444", label=label)
-        axes.axvline(1.0, color=style.BLACK, linestyle=":", linewidth=1.0)
-        axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names])
-        axes.invert_yaxis()
-        largest = max((g.before / (g.noise or g.variation or 1.0) for g in verdict.gap.values()), default=1.0)
-        if largest > 12:
-            axes.set_xscale("log")
-            axes.set_xlim(left=0.5)
-        axes.set_xlabel("root-mean-square difference over the channel's noise (dotted: the noise itself)")
-        axes.legend(loc="lower right", ncols=3)
+        stages = max(map(len, found.values()))
+        figure = Figure(figsize=(WIDTH, 0.95 + 0.33 * stages), layout="constrained")
+        grid = figure.subplots(1, len(verdict.gap), squeeze=False, sharey=True)[0]
+        for axes, (channel, gap) in zip(grid, verdict.gap.items(), strict=True):
+            _gap_panel(axes, gap, found[channel])
+            axes.set_title(spoken(channel))
+        grid[0].invert_yaxis()
     return figure
 
 
-def located_figure(diagnosis: Diagnosis) -> Figure | None:
-    """For the strongest places after the re-fit: the residual over the coordinate, or its spectrum."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    from hdsim.diagnose.locate import coordinates, order_lines
-
-    bench, stage = diagnosis.bench, diagnosis.stages[0]
-    residuals = bench.residuals(diagnosis.refit.fit.predictions)
-    shown: list[Place] = []
-    for place in stage.location.places:
-        if place.share >= 0.02 and (place.coordinate, place.channel) not in [
-            (p.coordinate, p.channel) for p in shown
-        ]:
-            shown.append(place)
-    shown = shown[:4]
-    if not shown:
-        return None
-    with rc_context(style.STYLE):
-        rows, wide = (len(shown) + 1) // 2, min(len(shown), 2)
-        figure = Figure(figsize=(5.5 * wide, 3.1 * rows), layout="constrained")
-        grid = figure.subplots(rows, wide, squeeze=False).ravel()
-        for axes in grid[len(shown) :]:
-            axes.set_axis_off()
-        for axes, place in zip(grid, shown, strict=False):
-            index = next(k for k, s in enumerate(bench.series) if s.channel == place.channel)
-            series = bench.series[index]
-            values = residuals[index]
-            if place.coordinate == "wave_generator_angle":
-                lines = order_lines(bench, residuals, place.channel, most=12)
-                for line in lines:
-                    axes.plot([line.order] * 2, [0, line.amplitude], color=style.BLUE, linewidth=2)
-                axes.set_xlabel("order per wave-generator turn")
-                axes.set_ylabel("amplitude")
-                axes.set_ylim(bottom=0)
-            else:
-                where = coordinates(bench, series, residuals)
-                x = where[place.coordinate]
-                thin = max(1, len(x) // POINTS)
-                used = np.flatnonzero(series.train)[::thin]
-                axes.plot(x[used], values[used], ".", markersize=1.5, color=style.GREY, alpha=0.5)
-                turned = where["direction"][used]
-                halves = (turned > 0, turned < 0) if place.coordinate in _LOOPS else (turned == turned,)
-                for half, colour, label in zip(
-                    halves, (style.ORANGE, style.BLUE), ("motor forwards", "motor backwards"), strict=False
-                ):
-                    _mean_curve(axes, x[used][half], values[used][half], colour, label)
-                if len(halves) == 2:
-                    axes.legend(loc="best")
-                axes.set_xlabel(_LABELS.get(place.coordinate, place.coordinate))
-                axes.set_ylabel("measured less model")
-            axes.set_title(
-                f"{place.channel}: {100 * place.share:.0f} % over {place.coordinate}".replace("_", " ")
-            )
-    return figure
+def _gap_panel(axes: Axes, gap: Gap, bars: Bars) -> None:
+    unit = unit_of(gap)
+    reach = max([*(b[1] for b in bars), *(b[2][1] for b in bars if b[2]), gap.noise]) or 1.0
+    for k, (_, value, interval, colour) in enumerate(bars):
+        low, high = interval or (value, value)
+        spread = unit.factor * np.array([[max(value - low, 0.0)], [max(high - value, 0.0)]])
+        axes.barh(k, unit.factor * value, 0.68, color=colour, xerr=spread, ecolor="#444444", capsize=2.5)
+        share = f"{100 * value / gap.before:.0f} %" if gap.before > 0 else ""
+        end = unit.factor * (max(value, high) + 0.03 * reach)
+        axes.text(end, k, f"{unit.factor * value:.3g}  ({share})", va="center", fontsize=8.5)
+    axes.axvline(unit.factor * gap.noise, color=style.BLACK, linestyle="--", linewidth=1.1)
+    axes.set_xlim(0, 1.45 * unit.factor * reach)
+    axes.set_yticks(range(len(bars)), [bar[0] for bar in bars])
+    axes.tick_params(axis="y", length=0)
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel(f"rms difference ({unit.name})")
 
 
-#: Coordinates over which the two directions of motion may differ.
-_LOOPS = ("torque", "output_angle", "temperature")
-
-
-def _mean_curve(axes: Axes, x: Array, values: Array, colour: str, label: str) -> None:
-    """Draw the mean of ``values`` over bins of ``x`` that hold equally many samples."""
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, 31))) if len(x) > 60 else np.zeros(0)
-    if len(edges) < 4:
-        return
-    inside = np.clip(np.searchsorted(edges, x) - 1, 0, len(edges) - 2)
-    count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
-    mean = np.bincount(inside, values, len(edges) - 1) / count
-    axes.plot(0.5 * (edges[1:] + edges[:-1]), mean, color=colour, linewidth=1.8, label=label)
-
-
-_LABELS = {
-    "time": "time (s)",
-    "velocity": "motor velocity (rad/s)",
-    "direction": "direction",
-    "time_since_reversal": "direction times log(1 + time since reversal / 20 ms)",
-    "output_angle": "output angle (rad)",
-    "torque": "torque at the output (N m)",
-    "temperature": "temperature (degC)",
-}
+def shown_values(bench_series: Series, ideal: Array, values: Array) -> Array:
+    """Values as they are drawn: of the output's angle, less motor angle over ratio."""
+    return np.asarray(values - ideal if bench_series.channel == "output_angle" else values)
 
 
 def trace_figure(diagnosis: Diagnosis) -> Figure | None:
-    """Each channel over time: what is left before and after, held-out stretches shaded."""
+    """A stretch of held-out data closely: measured, before and after on the left, what is left on the right."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    bench, predictions = diagnosis.bench, diagnosis.predictions
-    if not predictions:
-        return None
-    chosen: dict[str, int] = {}
-    for k, series in enumerate(bench.series):
-        if series.hold.any():
-            chosen.setdefault(series.channel, k)
+    chosen = _proved(diagnosis)
     if not chosen:
         return None
+    bench = diagnosis.bench
+    residuals = {stage: bench.residuals(diagnosis.predictions[stage]) for stage in ("before", "after")}
     with rc_context(style.STYLE):
-        figure = Figure(figsize=(11.0, 2.6 * len(chosen)), layout="constrained")
-        grid = figure.subplots(len(chosen), 2, squeeze=False, sharex=True)
-        residuals = {stage: bench.residuals(found) for stage, found in predictions.items()}
-        for (left, right), (channel, k) in zip(grid, chosen.items(), strict=True):
+        figure = Figure(figsize=(WIDTH, 0.5 + 2.0 * len(chosen)), layout="constrained")
+        grid = figure.subplots(len(chosen), 2, squeeze=False, width_ratios=[1.15, 1])
+        for (left, right), k in zip(grid, chosen, strict=True):
             series = bench.series[k]
             predictor = bench.predictors[series.record]
-            time = predictor.record.time
-            thin = max(1, len(time) // POINTS)
-            ideal = predictor.motor_angle / predictor.ratio if channel == "output_angle" else 0.0
-            name = (
-                "transmission error (rad)"
-                if channel == "output_angle"
-                else f"{channel.replace('_', ' ')} (N m)"
+            rows = closest_stretch(
+                predictor.record.time, series.hold, residuals["before"][k], residuals["after"][k]
             )
-            measured = np.where(series.train | series.hold, series.measured, np.nan) - ideal
-            left.plot(time[::thin], measured[::thin], color=style.GREY, linewidth=0.8, label="measured")
-            for stage, colour, label in (
-                ("before", style.BLUE, "model before"),
-                ("after", style.ORANGE, "model after"),
-            ):
-                model = series.measured - residuals[stage][k] - ideal
-                left.plot(time[::thin], model[::thin], color=colour, linewidth=0.9, label=label)
-                rest = np.where(series.train | series.hold, residuals[stage][k], np.nan)
-                right.plot(
-                    time[::thin], rest[::thin], color=colour, linewidth=0.6, label=f"measured less {label}"
+            time = predictor.record.time[rows]
+            good = (series.train | series.hold)[rows]
+            ideal = predictor.motor_angle[rows] / predictor.ratio
+            measured = shown_values(series, ideal, series.measured[rows])
+            measured = np.where(good, measured - (measured.mean() if _is_error(series) else 0.0), np.nan)
+            unit = _unit(series, measured)
+            left.plot(time, unit.factor * measured, color=MEASURED, linewidth=0.9, label="measured")
+            rest_unit = _unit(series, *(residuals[stage][k][rows] for stage in residuals))
+            for stage, colour in (("before", BEFORE), ("after", AFTER)):
+                rest = np.where(good, residuals[stage][k][rows], np.nan)
+                left.plot(
+                    time, unit.factor * (measured - rest), color=colour, linewidth=1.2, label=f"model {stage}"
                 )
-            left.set_title(name)
-            right.set_title("what is left (shaded: held out)")
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], series.hold.astype(int), [0]])))
-            for a, b in zip(edges[::2], edges[1::2], strict=True):
-                if b - a > 20:
-                    right.axvspan(time[a], time[min(b, len(time) - 1)], color="#EEEEEE", zorder=0)
-        grid[0, 0].legend(loc="best")
-        grid[0, 1].legend(loc="best")
+                right.plot(time, rest_unit.factor * rest, color=colour, linewidth=0.9, label=stage)
+            right.axhspan(
+                *(s * rest_unit.factor * series.noise for s in (-2, 2)),
+                color="#BBBBBB", alpha=0.45, zorder=0, linewidth=0, label="noise (95 %)",
+            )  # fmt: skip
+            name = "transmission error" if _is_error(series) else spoken(series.channel)
+            left.set_title(f"{name} ({unit.name})")
+            right.set_title(f"measured less model ({rest_unit.name})")
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        band = grid[0, 1].get_legend_handles_labels()
+        figure.legend(
+            [*handles, band[0][-1]], [*labels, band[1][-1]], loc="outside upper right", ncols=4, fontsize=9.5
+        )
         for axes in grid[-1]:
             axes.set_xlabel("time (s)")
+    return figure
+
+
+def whole_figure(diagnosis: Diagnosis) -> Figure | None:
+    """What is left of each channel over the whole record, the stretches that no fit has seen shaded."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    chosen = _proved(diagnosis)
+    if not chosen:
+        return None
+    bench = diagnosis.bench
+    residuals = {stage: bench.residuals(diagnosis.predictions[stage]) for stage in ("before", "after")}
+    with rc_context(style.STYLE):
+        figure = Figure(figsize=(WIDTH, 0.6 + 1.35 * len(chosen)), layout="constrained")
+        grid = figure.subplots(len(chosen), 1, squeeze=False)[:, 0]
+        for axes, k in zip(grid, chosen, strict=True):
+            series = bench.series[k]
+            time = bench.predictors[series.record].record.time
+            good = series.train | series.hold
+            thin = max(1, len(time) // POINTS)
+            unit = _unit(series, *(residuals[stage][k][good] for stage in residuals))
+            for stage, colour in (("before", BEFORE), ("after", AFTER)):
+                rest = np.where(good, unit.factor * residuals[stage][k], np.nan)
+                axes.plot(time[::thin], rest[::thin], color=colour, linewidth=0.7, label=stage)
+            for a, b in _runs(series.hold):
+                axes.axvspan(time[a], time[b - 1], color="#EFEFEF", zorder=0)
+            axes.set_xlim(time[0], time[-1])
+            axes.set_title(f"{spoken(series.channel)}: measured less model ({unit.name})")
+        _legend(grid[0])
+        grid[-1].set_xlabel("time (s)")
+    return figure
+
+
+def _proved(diagnosis: Diagnosis) -> list[int]:
+    """One series with held-out samples of each channel."""
+    if not diagnosis.predictions:
+        return []
+    chosen: dict[str, int] = {}
+    for k, series in enumerate(diagnosis.bench.series):
+        if series.hold.any():
+            chosen.setdefault(series.channel, k)
+    return list(chosen.values())
+
+
+def _is_error(series: Series) -> bool:
+    return series.channel == "output_angle"
+
+
+def _unit(series: Series, *curves: Array) -> units.Unit:
+    size = units.largest(*curves)
+    return units.for_error(size) if series.channel.endswith("angle") else units.for_torque(size)
+
+
+def _runs(flags: Mask, least: int = 20) -> list[tuple[int, int]]:
+    """First sample of each run of true, and the one after its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
+
+
+def closest_stretch(time: Array, hold: Mask, before: Array, after: Array) -> slice:
+    """The stretch of held-out samples, short enough to be read, in which the two residuals differ most."""
+    runs = _runs(hold) or [(0, len(time))]
+    gain = np.concatenate([[0.0], np.cumsum(np.where(hold, (before - after) ** 2, 0.0))])
+    period = float(np.median(np.diff(time)))
+    count = max(STRETCH_SAMPLES, int(STRETCH_S / period))
+    best, chosen = -1.0, slice(*runs[0])
+    for a, b in runs:
+        starts = np.arange(a, max(a + 1, b - count + 1), max(1, count // 10))
+        ends = np.minimum(starts + count, b)
+        means = (gain[ends] - gain[starts]) / (ends - starts)
+        k = int(np.argmax(means))
+        if means[k] > best:
+            best, chosen = float(means[k]), slice(int(starts[k]), int(ends[k]))
+    return chosen
+
+
+def _legend(axes: Axes) -> None:
+    """A legend above the panel, at its right: it covers no curve and no title."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
+
+
+def curve_figure(curve: CurveFound) -> Figure:
+    """The curve of what has no name, with the 95 % interval of each corner."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    values, bounds = np.array(curve.values), np.array(curve.intervals)
+    unit = (
+        units.for_error(units.largest(values))
+        if curve.unit == "rad"
+        else units.for_torque(units.largest(values))
+    )
+    at = np.array(curve.at)
+    across = units.Unit(curve.coordinate_unit, 1.0)
+    if curve.coordinate_unit == "rad":
+        across = units.for_angle(float(np.max(np.abs(at))))
+    if curve.period is not None:
+        at = np.append(at, at[0] + curve.period)
+        values, bounds = np.append(values, values[0]), np.vstack([bounds, bounds[:1]])
+    with rc_context(style.STYLE):
+        figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
+        axes = figure.subplots()
+        axes.fill_between(
+            across.factor * at, *(unit.factor * bounds.T), color="#C9A6D6", alpha=0.6, linewidth=0,
+            label="95 % interval",
+        )  # fmt: skip
+        axes.plot(across.factor * at, unit.factor * values, "o-", color="#7A2E91", label="curve")
+        axes.axhline(0.0, color="#888888", linewidth=0.8)
+        axes.set_xlabel(f"{spoken(curve.coordinate)} ({across.name})")
+        axes.set_ylabel(f"{spoken(curve.acts_on)} ({unit.name})")
+        _legend(axes)
     return figure

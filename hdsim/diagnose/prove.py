@@ -37,7 +37,6 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
         intervals: dict[str, tuple[float, float]] = {}
         for stage, found in residuals.items():
             numbers[stage], intervals[stage] = held_out_gap(bench, channel, found, rng)
-        series = bench.series[own[0]]
         result[channel] = Gap(
             before=numbers["before"],
             refit=numbers["refit"],

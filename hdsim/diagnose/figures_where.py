@@ -1,0 +1,227 @@
+"""Where a residual lives, in pictures: shares by coordinate, curves over coordinates, order spectra."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hdsim.diagnose.figures import AFTER, BEFORE, POINTS, REFIT, WIDTH
+from hdsim.diagnose.locate import coordinates, order_lines
+from hdsim.diagnose.wording import spoken
+from hdsim.plot import style, units
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from hdsim.diagnose.bench import Bench
+    from hdsim.diagnose.locate import Line, Place
+    from hdsim.diagnose.measured import Array
+    from hdsim.diagnose.workflow import Diagnosis
+
+#: Least share of a place that is drawn, most bars, and most panels of each kind beside them.
+LEAST, MOST_BARS, MOST_CURVES, MOST_SPECTRA = 0.02, 8, 2, 2
+#: Part of the best share that a place must have to get a panel.
+NEAR = 0.35
+#: Samples of which a drawn order spectrum is made, and the number of its orders.
+SPECTRUM_SAMPLES, SPECTRUM_ORDERS = 6000, 700
+#: Coordinates over which the two directions of motion may differ.
+_LOOPS = ("torque", "output_angle", "temperature")
+
+SHORT = {"wave_generator_angle": "orders of the wave generator", "torque": "torque at the output"}
+LABELS = {
+    "time": ("time", "s"),
+    "velocity": ("motor velocity", "rad/s"),
+    "direction": ("direction of motion", ""),
+    "time_since_reversal": ("direction × log(1 + time since reversal / 20 ms)", ""),
+    "output_angle": ("output angle", "rad"),
+    "torque": ("torque at the output", "N m"),
+    "temperature": ("temperature", "°C"),
+    "wave_generator_angle": ("wave-generator angle (orders)", ""),
+}
+
+
+def located_figure(diagnosis: Diagnosis) -> Figure | None:
+    """Shares of the re-fitted model's residual by coordinate, curves over the best, and order spectra."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    bench = diagnosis.bench
+    shown = _distinct(diagnosis.stages[0].location.places)
+    if not shown or not diagnosis.predictions:
+        return None
+    rest = {stage: bench.residuals(diagnosis.predictions[stage]) for stage in ("refit", "after")}
+    telling = [p for p in shown if p.share >= NEAR * shown[0].share]
+    curves = [p for p in telling if p.coordinate != "wave_generator_angle"][:MOST_CURVES]
+    spectra = [p for p in telling if p.coordinate == "wave_generator_angle"][:MOST_SPECTRA]
+    lines = {p.channel: order_lines(bench, rest["refit"], p.channel) for p in spectra}
+    spectra = [p for p in spectra if lines[p.channel]]
+    # The strongest place stands beside the bars.
+    panels = sorted([*curves, *spectra], key=lambda place: -place.share)
+    rows = (len(panels) + 2) // 2
+    with rc_context(style.STYLE):
+        figure = Figure(figsize=(WIDTH, 2.75 * rows), layout="constrained")
+        grid = figure.subplots(rows, 2, squeeze=False).ravel()
+        for axes in grid[len(panels) + 1 :]:
+            axes.set_axis_off()
+        _shares(grid[0], shown[:MOST_BARS])
+        changed = diagnosis.verdict.verdict == "effect" or diagnosis.verdict.curve is not None
+        for axes, place in zip(grid[1:], panels, strict=False):
+            if place.coordinate == "wave_generator_angle":
+                _spectrum(axes, bench, rest, lines[place.channel], place, after=changed)
+            else:
+                _over(axes, bench, rest, place, after=changed)
+        next(iter(grid[1:])).legend(loc="best", frameon=True, framealpha=0.8, edgecolor="none")
+    return figure
+
+
+def _distinct(places: Sequence[Place]) -> list[Place]:
+    """The best entry of each coordinate and channel that is worth a bar, by falling share."""
+    found: dict[tuple[str, str], Place] = {}
+    for place in places:
+        if place.share >= LEAST:
+            found.setdefault((place.coordinate, place.channel), place)
+    return list(found.values())
+
+
+def _shares(axes: Axes, places: Sequence[Place]) -> None:
+    for k, place in enumerate(places):
+        axes.barh(k, 100 * place.share, 0.68, color=REFIT)
+        axes.text(100 * place.share + 1.5, k, f"{100 * place.share:.0f} %", va="center", fontsize=8.5)
+    names = [
+        f"{spoken(place.channel)} over {SHORT.get(place.coordinate) or spoken(place.coordinate)}"
+        for place in places
+    ]
+    axes.set_yticks(range(len(places)), names)
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlim(0, 112)
+    axes.set_xticks([0, 25, 50, 75, 100])
+    axes.grid(visible=False, axis="y")
+    axes.invert_yaxis()
+    axes.set_xlabel("share of what the re-fitted model leaves (%)")
+    axes.set_title("Where the difference lives")
+
+
+def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, *, after: bool) -> None:
+    """The residual over a coordinate: points, and the mean over bins before and after."""
+    index = next(k for k, s in enumerate(bench.series) if s.channel == place.channel)
+    series = bench.series[index]
+    where = coordinates(bench, series, rest["refit"])
+    used = np.flatnonzero(series.train)
+    values = {stage: residuals[index][used] for stage, residuals in rest.items()}
+    low, high = np.quantile(values["refit"], [0.002, 0.998])
+    unit = _unit(place.channel, max(abs(low), abs(high)))
+    x = where[place.coordinate][used]
+    label, name = LABELS.get(place.coordinate, (spoken(place.coordinate), ""))
+    if name == "rad":
+        across = units.for_angle(float(np.max(np.abs(x))))
+        x, name = across.factor * x, across.name
+    thin = max(1, len(used) // POINTS)
+    axes.plot(
+        x[::thin], unit.factor * values["refit"][::thin], ".", markersize=2, color="#9A9A9A", alpha=0.45
+    )
+    turned = where["direction"][used]
+    if place.coordinate in _LOOPS and len(np.unique(turned)) > 1:
+        _mean(axes, x[turned > 0], unit.factor * values["refit"][turned > 0], BEFORE, "left, forwards", "-")
+        _mean(axes, x[turned < 0], unit.factor * values["refit"][turned < 0], BEFORE, "left, backwards", "--")
+    else:
+        _mean(axes, x, unit.factor * values["refit"], BEFORE, "left by the re-fitted model", "-")
+    if after:
+        _mean(axes, x, unit.factor * values["after"], AFTER, "left after", "-")
+    axes.set_ylim(*_limits(unit.factor * low, unit.factor * high))
+    axes.set_xlabel(f"{label} ({name})" if name else label)
+    axes.set_ylabel(f"measured less model ({unit.name})")
+    axes.set_title(f"{spoken(place.channel)}: {100 * place.share:.0f} % over {label.split(' ×')[0]}")
+
+
+def _limits(low: float, high: float) -> tuple[float, float]:
+    room = 0.25 * max(high - low, 1e-12)
+    return low - room, high + room
+
+
+def _mean(axes: Axes, x: Array, values: Array, colour: str, label: str, line: str) -> None:
+    """Draw the mean of ``values`` over bins of ``x`` that hold equally many samples."""
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, 41))) if len(x) > 80 else np.zeros(0)
+    if len(edges) < 4:
+        kinds = np.unique(x)
+        if 1 < len(kinds) < 4:
+            means = [values[x == kind].mean() for kind in kinds]
+            axes.plot(kinds, means, "o" + line, color=colour, linewidth=1.8, label=label)
+        return
+    inside = np.clip(np.searchsorted(edges, x) - 1, 0, len(edges) - 2)
+    count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
+    at, mean = (np.bincount(inside, v, len(edges) - 1) / count for v in (x, values))
+    axes.plot(at, mean, line, color=colour, linewidth=1.8, label=label)
+
+
+def _spectrum(
+    axes: Axes, bench: Bench, rest: dict[str, list[Array]], lines: list[Line], place: Place, *, after: bool
+) -> None:
+    """Amplitude over order per wave-generator turn, by least squares over the measured angle."""
+    own = [k for k, s in enumerate(bench.series) if s.channel == place.channel and s.train.any()]
+    highest = max(5.0, 1.15 * max(line.order for line in lines))
+    orders = np.unique(
+        np.concatenate([np.linspace(0.5, highest, SPECTRUM_ORDERS), [line.order for line in lines]])
+    )
+    angle = np.concatenate(
+        [bench.predictors[bench.series[k].record].motor_angle[bench.series[k].train] for k in own]
+    )
+    part = np.arange(len(angle))
+    if len(part) > SPECTRUM_SAMPLES:
+        part = np.random.default_rng(0).choice(len(part), SPECTRUM_SAMPLES, replace=False)
+    waves = np.exp(-1j * np.outer(orders, angle[part]))
+    found = {}
+    for stage, residuals in rest.items():
+        values = np.concatenate([residuals[k][bench.series[k].train] for k in own])[part]
+        found[stage] = 2.0 * np.abs(waves @ (values - values.mean())) / len(part)
+    unit = _unit(place.channel, float(found["refit"].max()))
+    axes.plot(
+        orders, unit.factor * found["refit"], color=BEFORE, linewidth=1.1, label="left by the re-fitted model"
+    )
+    if after:
+        axes.plot(orders, unit.factor * found["after"], color=AFTER, linewidth=1.1, label="left after")
+    top = unit.factor * float(found["refit"].max())
+    for at, text in _peaks(lines, highest, bench):
+        height = unit.factor * float(np.interp(at, orders, found["refit"]))
+        axes.annotate(text, (at, height), (0, 3), textcoords="offset points", ha="center", fontsize=8.5,
+                      fontweight="bold")  # fmt: skip
+    axes.set_xlim(0, highest)
+    axes.set_ylim(0, 1.28 * top)
+    axes.set_xlabel("order: periods per wave-generator turn")
+    axes.set_ylabel(f"amplitude ({unit.name})")
+    axes.set_title(f"{spoken(place.channel)}: {100 * place.share:.0f} % over orders")
+
+
+def _peaks(lines: Sequence[Line], span: float, bench: Bench) -> list[tuple[float, str]]:
+    """Where labels stand and what they say; those of neighbours are joined.
+
+    A line that these turns cannot tell from another order of the drive bears both names: errors of the fixed
+    member come at 2 and 4, those of the turning one at 2 and 4 less 2 and 4 over the ratio.
+    """
+    relative = 1.0 - 1.0 / bench.predictors[0].ratio
+    known = (2.0, 2.0 * relative, 4.0, 4.0 * relative)
+
+    def name(line: Line) -> str:
+        near = [order for order in known if abs(order - line.order) < 0.7 / bench.turns]
+        return "/".join(f"{order:.4g}" for order in near) if len(near) > 1 else f"{line.order:.4g}"
+
+    found: list[list[Line]] = []
+    for line in sorted(lines, key=lambda line: line.order):
+        if found and line.order - found[-1][-1].order < 0.07 * span:
+            found[-1].append(line)
+        else:
+            found.append([line])
+    return [
+        (
+            max(group, key=lambda line: line.amplitude).order,
+            " · ".join(dict.fromkeys(name(line) for line in group)),
+        )
+        for group in found
+    ]
+
+
+def _unit(channel: str, size: float) -> units.Unit:
+    return units.for_error(size) if channel.endswith("angle") else units.for_torque(size)

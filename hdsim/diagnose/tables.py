@@ -1,0 +1,90 @@
+"""Tables of the report and of the terminal."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hdsim.diagnose.verdict import FittedNumber, Verdict
+from hdsim.diagnose.wording import named_number, shown, spoken, unit_of
+
+GAP_HEAD = ("channel", "unit", "before", "re-fit", "after", "noise", "after/before", "after/noise")
+#: An interval that is wider than this many times its number does not tell it.
+WIDE = 1.0
+
+
+def gap_rows(verdict: Verdict) -> list[list[str]]:
+    """Rows of the gap table in readable units; the columns are ``GAP_HEAD``."""
+    rows = []
+    for channel, gap in verdict.gap.items():
+        unit = unit_of(gap)
+        numbers = [f"{unit.factor * v:.3g}" for v in (gap.before, gap.refit, gap.after, gap.noise)]
+        share = f"{100 * gap.after / gap.before:.0f} %" if gap.before > 0 else "-"
+        multiple = f"{gap.after / gap.noise:.2f}" if gap.noise > 0 else "-"
+        rows.append([spoken(channel), unit.name, *numbers, share, multiple])
+    return rows
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """A table as HTML.
+
+    Args:
+        head: names of the columns.
+        rows: cells; they are escaped.
+        numbers: columns that are set to the right.
+    """
+    kinds = [" class='n'" if k in numbers else "" for k in range(len(head))]
+    cells = "".join(f"<th{kind}>{html.escape(h)}</th>" for kind, h in zip(kinds, head, strict=True))
+    lines = "".join(
+        "<tr>" + "".join(f"<td{k}>{html.escape(c)}</td>" for k, c in zip(kinds, row, strict=True)) + "</tr>"
+        for row in rows
+    )
+    return f"<div class='wide'><table><tr>{cells}</tr>{lines}</table></div>"
+
+
+def numbers_table(
+    numbers: Mapping[str, FittedNumber], moved: Sequence[str] = (), settings: Mapping[str, Any] | None = None
+) -> str:
+    """Fitted numbers with their intervals and how far they moved; those in ``moved`` are marked.
+
+    Args:
+        numbers: by path.
+        moved: paths of those whose start lies outside of their interval.
+        settings: of the effect whose numbers they are; its orders name harmonics.
+    """
+    based = any(n.start is not None for n in numbers.values())
+    head = ["number", "unit", *(["model", "fitted", "moved"] if based else ["fitted"]), "95 % interval"]
+    lines = []
+    # What was moved comes first, what the data do not tell last.
+    order = sorted(numbers, key=lambda name: (name not in moved, numbers[name].interval is None))
+    for name in order:
+        n = numbers[name]
+        words, unit = named_number(name, settings)
+        cells = [f"<td>{html.escape(words)}<code>{html.escape(name)}</code></td>", f"<td>{unit}</td>"]
+        if based:
+            start = "" if n.start is None else shown(n.start)
+            change = f"{100 * (n.value / n.start - 1):+.1f} %" if n.start and n.interval is not None else ""
+            cells += [f"<td class='n'>{text}</td>" for text in (start, shown(n.value), change)]
+        else:
+            cells.append(f"<td class='n'>{shown(n.value)}</td>")
+        cells.append(f"<td>{html.escape(_interval(n, unit))}</td>")
+        mark = " class='moved'" if name in moved else ""
+        lines.append(f"<tr{mark}>{''.join(cells)}</tr>")
+    right = {"model", "fitted", "moved"}
+    titles = "".join(f"<th{' class=n' if h in right else ''}>{h}</th>" for h in head)
+    return f"<div class='wide'><table><tr>{titles}</tr>{''.join(lines)}</table></div>"
+
+
+def _interval(number: FittedNumber, unit: str) -> str:
+    if number.interval is None:
+        if number.start is None:
+            return "exact, or read from the spectrum"
+        tied = ", ".join(named_number(name)[0] for name in number.tied_to)
+        return "not determined by these data" + (f": cannot be told from {tied}" if tied else "")
+    low, high = number.interval
+    text = f"{shown(low)} to {shown(high)}"
+    # The size of a phase means nothing; 120 degrees leave two thirds of the circle.
+    if high - low > (120.0 if unit == "deg" else WIDE * abs(number.value)):
+        text += " (poorly determined)"
+    return text

@@ -1,0 +1,239 @@
+"""A verdict in words for readers who have never seen hdsim: how sure it is, what it means, what it gains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hdsim.diagnose.verdict import FittedNumber, Gap, NamedEffect, Verdict
+from hdsim.plot import units
+
+if TYPE_CHECKING:
+    from hdsim.diagnose.workflow import Diagnosis
+
+KINDS = {
+    "nothing": "Nothing is missing",
+    "parameter": "Numbers of the model are off",
+    "effect": "The model is missing an effect",
+    "unknown": "Something without a name is missing",
+}
+MEANINGS = {
+    "nothing": "The model has all that these data show: what it does not predict looks like noise. Effects "
+    "too "
+    "weak to be seen here, or not excited by this motion, may still be there.",
+    "parameter": "The model has the right parts, but some of its numbers do not fit this machine. With the "
+    "fitted numbers below, no further effect is seen.",
+    "effect": "A known physical effect that the model does not have explains what no change of the model's "
+    "own "
+    "numbers can. It is added, with fitted numbers, in found.yaml.",
+    "unknown": "A pattern is left that repeats, and no known effect explains it well enough to be named. "
+    "Better no name than a wrong one: it is given as a curve instead.",
+}
+#: Words for the share of resampled records in which the same name wins, from the highest down.
+_SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sure"))
+#: Words for how many standard errors the number that moved farthest lies from the model's.
+_FAR = ((6.0, "Very sure"), (3.5, "Sure"), (0.0, "Fairly sure"))
+#: Standard deviations in a 95 % interval, from end to end; intervals are made of two to each side.
+_INTERVAL = 4.0
+
+_UNITS = {
+    "nm_s_per_rad": "N m s/rad",
+    "nm_per_rad": "N m/rad",
+    "rad_per_s": "rad/s",
+    "nm_per_k": "N m/K",
+    "kg_m2": "kg m²",
+    "per_k": "1/K",
+    "per_rad": "1/rad",
+    "arcmin": "arcmin",
+    "arcsec": "arcsec",
+    "deg": "deg",
+    "degc": "°C",
+    "rad": "rad",
+    "kg": "kg",
+    "nm": "N m",
+    "ms": "ms",
+    "hz": "Hz",
+    "um": "µm",
+    "mm": "mm",
+    "m": "m",
+    "s": "s",
+    "n": "N",
+    "k": "K",
+}
+
+
+@dataclass(frozen=True)
+class Sureness:
+    """How sure a verdict is: in a word or two, as a number, and what the number is."""
+
+    words: str
+    number: str
+    details: tuple[str, ...]
+
+
+def spoken(name: str) -> str:
+    """A name of the program as words."""
+    return name.replace("_", " ")
+
+
+def shown(value: float) -> str:
+    """A number with four digits, without an exponent as long as it stays readable."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    if 1e-3 <= abs(value) < 1e6:
+        digits = max(0, 3 - math.floor(math.log10(abs(value))))
+        text = f"{value:.{digits}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    mantissa, _, exponent = f"{value:.3e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
+
+
+def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[str, str]:
+    """Words and unit of a number by its path: ``drive.friction.coulomb_nm`` is friction, coulomb in N m.
+
+    Args:
+        path: dotted path.
+        settings: of the effect, where the path leads into one; they tell the orders of harmonics.
+    """
+    parts = path.split(".")
+    last, unit = parts[-1], ""
+    for suffix in sorted(_UNITS, key=len, reverse=True):
+        if last.endswith(f"_{suffix}"):
+            last, unit = last.removesuffix(f"_{suffix}"), _UNITS[suffix]
+            break
+    sections: list[str] = []
+    here: Any = settings
+    for part in parts[:-1]:
+        try:
+            here = here[int(part) if part.isdigit() else part] if here is not None else None
+        except (KeyError, IndexError, TypeError):
+            here = None
+        if part.isdigit() and isinstance(here, Mapping) and "order" in here:
+            # The order tells more than the name of the list and the place in it.
+            turn = spoken(str(here.get("per", "wave_generator_turn")))
+            sections[-1:] = [f"order {here['order']:g} per {turn}"]
+        elif part != "drive":
+            sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
+    return ", ".join([*sections, spoken(last)]), unit
+
+
+def unit_of(gap: Gap) -> units.Unit:
+    """The unit in which a gap is readable; gaps are stored in SI units."""
+    if gap.unit == "rad":
+        return units.for_error(gap.before)
+    return units.for_torque(gap.before) if gap.unit == "N m" else units.Unit(gap.unit, 1.0)
+
+
+def titles_of(effect: NamedEffect) -> list[str]:
+    """The effect's title, and the titles of those that it cannot be told from."""
+    from hdsim.effects import catalogue
+
+    known = catalogue()
+    others = (known[name].title if name in known else spoken(name) for name in effect.indistinguishable_from)
+    return [effect.title or spoken(effect.name), *others]
+
+
+def sureness(diagnosis: Diagnosis) -> Sureness:
+    """How sure a diagnosis is."""
+    verdict = diagnosis.verdict
+    search = [stage.screening for stage in diagnosis.stages if stage.screening is not None]
+    last = search[-1].chance if search else 1.0
+    if verdict.verdict == "effect":
+        return _of_effects(verdict.effects)
+    if verdict.verdict == "unknown":
+        chance = min(stage.location.chance for stage in diagnosis.stages)
+        share = max(stage.location.structured for stage in diagnosis.stages)
+        said = (
+            f"The chance to see so much of a pattern in pure noise is {below(chance)}.",
+            f"{percent(share)} of what the model leaves, weighed by the noise, is that pattern; the named "
+            f"effects "
+            "explain too little of it.",
+        )
+        return Sureness("Sure that something is missing, not what", f"chance {below(chance)}", said)
+    nothing_more = (
+        f"The best of all effects tried explains no more than one finds by chance in {percent(last)} of "
+        f"records "
+        "in which nothing is missing (named only below 2 %)."
+        if search and search[-1].ranked
+        else "No effect of the catalogue could be tried on these data."
+    )
+    if verdict.verdict == "parameter":
+        far = farthest(verdict)
+        number = f"{far:.2g} standard errors" if far < 100 else "over 100 standard errors"
+        said = (
+            f"{number} lie between the model's number and the fitted one that moved farthest.",
+            nothing_more,
+        )
+        return Sureness(_word(_FAR, far), number, said)
+    ratios = [gap.after / gap.noise for gap in verdict.gap.values() if gap.noise > 0]
+    worst = max(ratios, default=math.nan)
+    said = (nothing_more,)
+    if ratios:
+        said += (f"What is left is at most {worst:.2g} times the noise of its channel.",)
+    return Sureness("No sign of anything missing", f"{percent(last)} by chance", said)
+
+
+def _of_effects(effects: Sequence[NamedEffect]) -> Sureness:
+    weakest = min(effects, key=lambda effect: effect.confidence)
+    words = _word(_SURE, weakest.confidence)
+    groups = [titles_of(effect) for effect in effects if effect.indistinguishable_from]
+    if groups:
+        words += " that it is one of these, not which" if len(effects) == 1 else ", but for the groups below"
+    said = []
+    for effect in effects:
+        alone = "it or one of its group" if effect.indistinguishable_from else "it"
+        alone = alone if len(effects) > 1 else alone[:1].upper() + alone[1:]
+        title = f"{effect.title or spoken(effect.name)}: " if len(effects) > 1 else ""
+        said.append(
+            f"{title}{alone} is the best explanation in {percent(effect.confidence)} of resampled records. "
+            f"Where "
+            f"nothing is missing, the whole search finds as much in {below(effect.chance)} of cases."
+        )
+    return Sureness(words, percent(weakest.confidence), tuple(said))
+
+
+def farthest(verdict: Verdict) -> float:
+    """Distance of the fitted number that moved farthest from the model's, in standard errors."""
+    found = [_distance(verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters]
+    return max(found, default=0.0)
+
+
+def _distance(number: FittedNumber) -> float:
+    if number.interval is None or number.start is None:
+        return 0.0
+    low, high = number.interval
+    if number.start > 0 and number.value > 0 and low > 0:
+        # Numbers of the model are fitted by their logarithm.
+        spread = math.log(high / low) / _INTERVAL
+        return abs(math.log(number.value / number.start)) / spread if spread > 0 else math.inf
+    spread = (high - low) / _INTERVAL
+    return abs(number.value - number.start) / spread if spread > 0 else math.inf
+
+
+def gains(verdict: Verdict) -> list[str]:
+    """A sentence for each channel: what the gap was and is."""
+    said = []
+    for channel, gap in verdict.gap.items():
+        unit = unit_of(gap)
+        before, after, noise = (f"{unit.factor * v:.3g}" for v in (gap.before, gap.after, gap.noise))
+        change = f"{before} → {after} {unit.name}" if before != after else f"stays at {after} {unit.name}"
+        fall = 100 * (gap.after / gap.before - 1) if gap.before > 0 else 0.0
+        change += f" ({fall:+.0f} %)" if abs(fall) >= 0.5 else ""
+        said.append(f"{spoken(channel)}: {change}; noise {noise}".replace("(-", "(−"))
+    return said
+
+
+def _word(words: Sequence[tuple[float, str]], value: float) -> str:
+    return next(word for least, word in words if value >= least)
+
+
+def percent(share: float) -> str:
+    """A share in percent; what resampling cannot tell from all is not called all."""
+    return "over 99 %" if share > 0.995 else f"{100 * share:.0f} %"
+
+
+def below(chance: float) -> str:
+    """A probability in percent; what so many draws cannot tell from zero is said as a bound."""
+    return f"less than {100 * chance:.2g} %" if chance <= 0.005 else f"{100 * chance:.2g} %"
