@@ -11,6 +11,8 @@ from hdsim.diagnose.wording import spoken, unit_of
 from hdsim.plot import style, units
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -35,17 +37,21 @@ Bars = list[tuple[str, float, tuple[float, float] | None, str]]
 
 
 def gap_bars(diagnosis: Diagnosis) -> dict[str, Bars]:
-    """By channel, the held-out gap before, after the re-fit, after each effect of the search, and at the end."""
+    """The held-out gap of each channel: before, after the re-fit, after each effect, and at the end."""
     bench, verdict = diagnosis.bench, diagnosis.verdict
     last = "with the curve" if verdict.curve is not None else "with the effect"
+    # Where nothing is added, the re-fitted model is what comes out.
+    own = REFIT if verdict.verdict == "effect" or verdict.curve is not None else AFTER
     found: dict[str, Bars] = {}
     for channel, gap in verdict.gap.items():
         found[channel] = [
             ("model as given", gap.before, gap.intervals.get("before"), BEFORE),
-            ("own numbers re-fitted", gap.refit, gap.intervals.get("refit"), REFIT),
+            ("own numbers re-fitted", gap.refit, gap.intervals.get("refit"), own),
         ]
     if len(verdict.effects) > 1:
-        last = f"with all {len(verdict.effects)} effects"
+        last = (
+            "with both effects" if len(verdict.effects) == 2 else f"with all {len(verdict.effects)} effects"
+        )
         for stage in diagnosis.stages:
             state = stage.named.fit.state if stage.named is not None else None
             if state is None or len(state.added) >= len(verdict.effects):
@@ -103,7 +109,7 @@ def shown_values(bench_series: Series, ideal: Array, values: Array) -> Array:
 
 
 def trace_figure(diagnosis: Diagnosis) -> Figure | None:
-    """A stretch of held-out data closely: measured, before and after on the left, what is left on the right."""
+    """A stretch of held-out data closely: measured, before and after, and beside it what is left."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -115,12 +121,23 @@ def trace_figure(diagnosis: Diagnosis) -> Figure | None:
     with rc_context(style.STYLE):
         figure = Figure(figsize=(WIDTH, 0.5 + 2.0 * len(chosen)), layout="constrained")
         grid = figure.subplots(len(chosen), 2, squeeze=False, width_ratios=[1.15, 1])
+        stretches: dict[int, slice] = {}
         for (left, right), k in zip(grid, chosen, strict=True):
             series = bench.series[k]
             predictor = bench.predictors[series.record]
-            rows = closest_stretch(
-                predictor.record.time, series.hold, residuals["before"][k], residuals["after"][k]
-            )
+            if series.record not in stretches:
+                stretches[series.record] = worst_stretch(
+                    predictor.record.time,
+                    [
+                        np.where(
+                            bench.series[j].hold, residuals["before"][j] / (bench.series[j].noise or 1.0), 0.0
+                        )
+                        for j in chosen
+                        if bench.series[j].record == series.record
+                    ],
+                    series.hold,
+                )
+            rows = stretches[series.record]
             time = predictor.record.time[rows]
             good = (series.train | series.hold)[rows]
             ideal = predictor.motor_angle[rows] / predictor.ratio
@@ -209,10 +226,16 @@ def _runs(flags: Mask, least: int = 20) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
 
 
-def closest_stretch(time: Array, hold: Mask, before: Array, after: Array) -> slice:
-    """The stretch of held-out samples, short enough to be read, in which the two residuals differ most."""
+def worst_stretch(time: Array, off: Sequence[Array], hold: Mask) -> slice:
+    """The stretch of held-out samples, short enough to be read, in which the model is farthest off.
+
+    Args:
+        time: shape (n,), s.
+        off: differences of the channels, each over its noise, shape (n,).
+        hold: held-out samples.
+    """
     runs = _runs(hold) or [(0, len(time))]
-    gain = np.concatenate([[0.0], np.cumsum(np.where(hold, (before - after) ** 2, 0.0))])
+    gain = np.concatenate([[0.0], np.cumsum(np.sum(np.square(off), axis=0))])
     period = float(np.median(np.diff(time)))
     count = max(STRETCH_SAMPLES, int(STRETCH_S / period))
     best, chosen = -1.0, slice(*runs[0])
@@ -259,6 +282,6 @@ def curve_figure(curve: CurveFound) -> Figure:
         axes.plot(across.factor * at, unit.factor * values, "o-", color="#7A2E91", label="curve")
         axes.axhline(0.0, color="#888888", linewidth=0.8)
         axes.set_xlabel(f"{spoken(curve.coordinate)} ({across.name})")
-        axes.set_ylabel(f"{spoken(curve.acts_on)} ({unit.name})")
+        axes.set_ylabel(f"{curve.words.partition(' over ')[0]} ({unit.name})")
         _legend(axes)
     return figure

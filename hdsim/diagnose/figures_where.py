@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from hdsim.diagnose.measured import Array
     from hdsim.diagnose.workflow import Diagnosis
 
-#: Least share of a place that is drawn, most bars, and most panels of each kind beside them.
-LEAST, MOST_BARS, MOST_CURVES, MOST_SPECTRA = 0.02, 8, 2, 2
+#: Least share of a place that is drawn, most bars, and most panels beside them.
+LEAST, MOST_BARS, MOST_PANELS = 0.02, 8, 3
 #: Part of the best share that a place must have to get a panel.
 NEAR = 0.35
 #: Samples of which a drawn order spectrum is made, and the number of its orders.
@@ -54,28 +54,41 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
     if not shown or not diagnosis.predictions:
         return None
     rest = {stage: bench.residuals(diagnosis.predictions[stage]) for stage in ("refit", "after")}
-    telling = [p for p in shown if p.share >= NEAR * shown[0].share]
-    curves = [p for p in telling if p.coordinate != "wave_generator_angle"][:MOST_CURVES]
-    spectra = [p for p in telling if p.coordinate == "wave_generator_angle"][:MOST_SPECTRA]
+    panels = _panels(shown)
+    spectra = [p for p in panels if p.coordinate == "wave_generator_angle"]
     lines = {p.channel: order_lines(bench, rest["refit"], p.channel) for p in spectra}
-    spectra = [p for p in spectra if lines[p.channel]]
-    # The strongest place stands beside the bars.
-    panels = sorted([*curves, *spectra], key=lambda place: -place.share)
-    rows = (len(panels) + 2) // 2
+    panels = [p for p in panels if p not in spectra or lines[p.channel]]
     with rc_context(style.STYLE):
+        rows = (len(panels) + 2) // 2
         figure = Figure(figsize=(WIDTH, 2.75 * rows), layout="constrained")
-        grid = figure.subplots(rows, 2, squeeze=False).ravel()
-        for axes in grid[len(panels) + 1 :]:
-            axes.set_axis_off()
-        _shares(grid[0], shown[:MOST_BARS])
+        grid = figure.add_gridspec(rows, 2)
+        # Two panels stand over one another beside the bars, three fill the square.
+        places = (
+            [grid[:, 0], grid[0, 1], grid[1, 1]]
+            if len(panels) == 2
+            else [grid[k // 2, k % 2] for k in range(4)[: len(panels) + 1]]
+        )
+        axes_of = [figure.add_subplot(place) for place in places]
+        _shares(axes_of[0], shown[:MOST_BARS])
         changed = diagnosis.verdict.verdict == "effect" or diagnosis.verdict.curve is not None
-        for axes, place in zip(grid[1:], panels, strict=False):
+        for axes, place in zip(axes_of[1:], panels, strict=True):
             if place.coordinate == "wave_generator_angle":
                 _spectrum(axes, bench, rest, lines[place.channel], place, after=changed)
             else:
                 _over(axes, bench, rest, place, after=changed)
-        next(iter(grid[1:])).legend(loc="best", frameon=True, framealpha=0.8, edgecolor="none")
+        axes_of[1].legend(loc="best", frameon=True, framealpha=0.8, edgecolor="none")
     return figure
+
+
+def _panels(shown: Sequence[Place]) -> list[Place]:
+    """Places that get a picture: the best of each channel first, then further quantities."""
+    telling = [place for place in shown if place.share >= NEAR * shown[0].share]
+    first = {place.channel: place for place in reversed(telling)}
+    chosen = [place for place in telling if first[place.channel] is place]
+    for place in telling:
+        if place.coordinate not in {other.coordinate for other in chosen}:
+            chosen.append(place)
+    return sorted(chosen[:MOST_PANELS], key=lambda place: -place.share)
 
 
 def _distinct(places: Sequence[Place]) -> list[Place]:
@@ -100,9 +113,9 @@ def _shares(axes: Axes, places: Sequence[Place]) -> None:
     axes.set_xlim(0, 112)
     axes.set_xticks([0, 25, 50, 75, 100])
     axes.grid(visible=False, axis="y")
-    axes.invert_yaxis()
     axes.set_xlabel("share of what the re-fitted model leaves (%)")
-    axes.set_title("Where the difference lives")
+    axes.set_title("Share by quantity")
+    axes.set_ylim(max(len(places), 5) - 0.4, -0.6)
 
 
 def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, *, after: bool) -> None:
@@ -134,7 +147,10 @@ def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, 
     axes.set_ylim(*_limits(unit.factor * low, unit.factor * high))
     axes.set_xlabel(f"{label} ({name})" if name else label)
     axes.set_ylabel(f"measured less model ({unit.name})")
-    axes.set_title(f"{spoken(place.channel)}: {100 * place.share:.0f} % over {label.split(' ×')[0]}")
+    axes.set_title(
+        f"{spoken(place.channel)}: {100 * place.share:.0f} % over "
+        f"{SHORT.get(place.coordinate) or spoken(place.coordinate)}"
+    )
 
 
 def _limits(low: float, high: float) -> tuple[float, float]:
@@ -154,6 +170,9 @@ def _mean(axes: Axes, x: Array, values: Array, colour: str, label: str, line: st
     inside = np.clip(np.searchsorted(edges, x) - 1, 0, len(edges) - 2)
     count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
     at, mean = (np.bincount(inside, v, len(edges) - 1) / count for v in (x, values))
+    # No line across a stretch without samples.
+    hole = 1 + np.flatnonzero(np.diff(at) > 6.0 * np.median(np.diff(at)))
+    at, mean = np.insert(at, hole, np.nan), np.insert(mean, hole, np.nan)
     axes.plot(at, mean, line, color=colour, linewidth=1.8, label=label)
 
 

@@ -14,7 +14,17 @@ from hdsim.diagnose.figures_where import located_figure
 from hdsim.diagnose.name import LEAST_SHARE, LEVEL
 from hdsim.diagnose.tables import GAP_HEAD, gap_rows, numbers_table, table
 from hdsim.diagnose.verdict import Verdict
-from hdsim.diagnose.wording import KINDS, MEANINGS, gains, percent, shown, spoken, sureness, titles_of
+from hdsim.diagnose.wording import (
+    KINDS,
+    MEANINGS,
+    gains,
+    headline,
+    percent,
+    shown,
+    spoken,
+    sureness,
+    titles_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +47,7 @@ _CAPTIONS = {
     "time left out of the fit; the shares of related quantities overlap. Grey: measured samples. Orange: "
     "what "
     "the re-fitted model leaves. Green: what is left with what was found.",
-    "traces": "The stretch of held-out data in which the model before and after differ most. Grey band: "
+    "traces": "The stretch of held-out data in which the model as given is farthest off. Grey band: "
     "twice "
     "the sensor's noise to either side; what stays inside is explained. Sensors' offsets are taken out.",
     "whole": "The same difference over the whole record. Shaded: held out, no fit has seen it.",
@@ -140,12 +150,15 @@ def _origin(diagnosis: Diagnosis) -> str:
 def _head(diagnosis: Diagnosis) -> str:
     verdict = diagnosis.verdict
     sure = sureness(diagnosis)
-    long = " class='long'" if len(verdict.sentence) > LONG else ""
+    said = headline(verdict)
+    long = " class='long'" if len(said) > LONG else ""
+    same = said == verdict.sentence
+    sentence = "" if same else f"<p class='note'>{html.escape(verdict.sentence)}</p>"
     listed = "".join(f"<li>{html.escape(line)}</li>" for line in gains(verdict))
     unseen = "Gap on data that no fit has seen:" if verdict.gap else "No data were held out."
     return (
         f"<header class='verdict'><p class='kind'>{KINDS[verdict.verdict]}</p>"
-        f"<h1{long}>{html.escape(verdict.sentence)}</h1><div class='facts'>"
+        f"<h1{long}>{html.escape(said)}</h1>{sentence}<div class='facts'>"
         f"<div><h2>How sure</h2><p class='big'>{html.escape(sure.words)}: "
         f"<span class='number'>{html.escape(sure.number)}</span></p>"
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)
@@ -175,12 +188,10 @@ def _confusions(verdict: Verdict) -> str:
         if not effect.indistinguishable_from:
             continue
         own, *others = titles_of(effect)
-        lines = "".join(
-            f"<li><b>{html.escape(title)}</b>"
-            + (f". What separates the two: {html.escape(effect.separated_by[name])}" if effect.separated_by.get(name)
-               else "") + "</li>"
-            for name, title in zip(effect.indistinguishable_from, others, strict=True)
-        )  # fmt: skip
+        lines = ""
+        for name, title in zip(effect.indistinguishable_from, others, strict=True):
+            rule = effect.separated_by.get(name) or "no rule is known"
+            lines += f"<li><b>{html.escape(title)}</b>. What separates the two: {html.escape(rule)}.</li>"
         body += f"<p>These data cannot tell <b>{html.escape(own)}</b> from:</p><ul>{lines}</ul>"
     if verdict.suspects:
         listed = ", ".join(f"{spoken(name)} ({percent(share)})" for name, share in verdict.suspects.items())
@@ -208,7 +219,7 @@ def _next(verdict: Verdict) -> str:
         f"1 is a "
         f"guess that is right in 69 % of cases, 3 in 93 %, more is safe. Here {proposal.separation:.2g} is "
         f"expected, "
-        f"which is right in {100 * proposal.correct:.3g} % of cases if the noise is all that is unknown.</p>"
+        f"which is right in {percent(proposal.correct)} of cases if the noise is all that is unknown.</p>"
     )
     head = ("experiment", "expected d′", "against repeating the record")
     return f"<section id='next'><h2>What to measure next</h2>{body}{table(head, rows, (1, 2))}</section>"

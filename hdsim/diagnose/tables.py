@@ -60,11 +60,14 @@ def numbers_table(
     order = sorted(numbers, key=lambda name: (name not in moved, numbers[name].interval is None))
     for name in order:
         n = numbers[name]
+        if settings is not None and name.endswith(".order"):
+            continue  # it names the harmonic in the other rows
         words, unit = named_number(name, settings)
         cells = [f"<td>{html.escape(words)}<code>{html.escape(name)}</code></td>", f"<td>{unit}</td>"]
         if based:
             start = "" if n.start is None else shown(n.start)
-            change = f"{100 * (n.value / n.start - 1):+.1f} %" if n.start and n.interval is not None else ""
+            moved_by = 100 * (n.value / n.start - 1) if n.start else 0.0
+            change = f"{moved_by:+.1f} %" if abs(moved_by) >= 0.05 and n.interval is not None else ""
             cells += [f"<td class='n'>{text}</td>" for text in (start, shown(n.value), change)]
         else:
             cells.append(f"<td class='n'>{shown(n.value)}</td>")

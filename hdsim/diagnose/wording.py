@@ -135,6 +135,32 @@ def titles_of(effect: NamedEffect) -> list[str]:
     return [effect.title or spoken(effect.name), *others]
 
 
+def headline(verdict: Verdict) -> str:
+    """The verdict's sentence for a heading: numbers by words instead of paths, alternatives side by side."""
+    sentence = verdict.sentence
+    if verdict.verdict == "effect" and any(effect.indistinguishable_from for effect in verdict.effects):
+        parts = []
+        for effect in verdict.effects:
+            titles = titles_of(effect)
+            parts.append(" or ".join(titles) + (" (these data cannot tell which)" if len(titles) > 1 else ""))
+        said = f"The model is missing {'; and '.join(parts)}."
+    elif verdict.verdict == "parameter":
+        said = f"No effect is missing; {len(verdict.moved)} numbers of the model are off: "
+        said = said.replace("1 numbers of the model are", "one number of the model is")
+        said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."
+    else:
+        return sentence
+    # What is to be checked first stays first.
+    doubt = sentence.partition("Check the data first: ")[2]
+    return f"Check the data first (below). {said}" if doubt else said
+
+
+def _change(name: str, number: FittedNumber) -> str:
+    words, unit = named_number(name)
+    start = "" if number.start is None else f" instead of {shown(number.start)}"
+    return f"{words} {shown(number.value)}{start} {unit}".rstrip()
+
+
 def sureness(diagnosis: Diagnosis) -> Sureness:
     """How sure a diagnosis is."""
     verdict = diagnosis.verdict
@@ -153,19 +179,16 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
         )
         return Sureness("Sure that something is missing, not what", f"chance {below(chance)}", said)
     nothing_more = (
-        f"The best of all effects tried explains no more than one finds by chance in {percent(last)} of "
-        f"records "
-        "in which nothing is missing (named only below 2 %)."
+        "Nothing more is seen: where nothing is missing, some effect of the catalogue looks as good by "
+        "chance "
+        f"in {percent(last)} of cases (one is named only below 2 %)."
         if search and search[-1].ranked
         else "No effect of the catalogue could be tried on these data."
     )
     if verdict.verdict == "parameter":
         far = farthest(verdict)
         number = f"{far:.2g} standard errors" if far < 100 else "over 100 standard errors"
-        said = (
-            f"{number} lie between the model's number and the fitted one that moved farthest.",
-            nothing_more,
-        )
+        said = (f"The number that moved farthest lies {number} from the model's.", nothing_more)
         return Sureness(_word(_FAR, far), number, said)
     ratios = [gap.after / gap.noise for gap in verdict.gap.values() if gap.noise > 0]
     worst = max(ratios, default=math.nan)
@@ -180,7 +203,9 @@ def _of_effects(effects: Sequence[NamedEffect]) -> Sureness:
     words = _word(_SURE, weakest.confidence)
     groups = [titles_of(effect) for effect in effects if effect.indistinguishable_from]
     if groups:
-        words += " that it is one of these, not which" if len(effects) == 1 else ", but for the groups below"
+        words += (
+            " that it is one of these, not which" if len(effects) == 1 else ", up to the alternatives given"
+        )
     said = []
     for effect in effects:
         alone = "it or one of its group" if effect.indistinguishable_from else "it"
@@ -231,9 +256,9 @@ def _word(words: Sequence[tuple[float, str]], value: float) -> str:
 
 def percent(share: float) -> str:
     """A share in percent; what resampling cannot tell from all is not called all."""
-    return "over 99 %" if share > 0.995 else f"{100 * share:.0f} %"
+    return "over 99\u00a0%" if share > 0.995 else f"{100 * share:.0f}\u00a0%"
 
 
 def below(chance: float) -> str:
     """A probability in percent; what so many draws cannot tell from zero is said as a bound."""
-    return f"less than {100 * chance:.2g} %" if chance <= 0.005 else f"{100 * chance:.2g} %"
+    return f"less than {100 * chance:.2g}\u00a0%" if chance <= 0.005 else f"{100 * chance:.2g}\u00a0%"
