@@ -43,6 +43,8 @@ class Fit:
         columns: sensitivities of the predictions to every free number, whitened, shape (rows, p).
         undetermined: numbers that were left where they were, because the data do not determine them.
         ties: for each undetermined number, those that it cannot be told from.
+        beside: sensitivities to the undetermined numbers, shape (rows, u), and their prior spreads (u,): not
+            knowing them widens the intervals of the others.
     """
 
     state: State
@@ -53,6 +55,7 @@ class Fit:
     columns: Array
     undetermined: list[Free]
     ties: dict[str, list[str]]
+    beside: tuple[Array, Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -126,6 +129,7 @@ def fit(
     evaluations: int = EVALUATIONS,
     prune: bool = True,
     theta: Mapping[str, float] | None = None,
+    beside: tuple[Array, Array] | None = None,
 ) -> Fit:
     """Fit a model to the training data.
 
@@ -137,6 +141,7 @@ def fit(
         evaluations: residuals that the optimiser may ask for.
         prune: leave numbers that the data do not determine where they are.
         theta: where the logarithms of the base's factors start, by name; 0 by default.
+        beside: sensitivities to numbers that nobody knows, and their prior spreads; see ``Fit``.
 
     Raises:
         PredictionError: the start itself could not be predicted.
@@ -199,9 +204,9 @@ def fit(
     rest = found.fun[:rows] / worth
     fitted = vector.state(found.x)
     predictions = bench.predict(fitted.candidate(), fitted.gain)
-    covariance = robust_covariance(columns, rest, blocks, priors)
+    covariance = robust_covariance(columns, rest, blocks, priors, beside)
     factors = found.x[: len(chosen)]
-    return Fit(fitted, chosen, factors, covariance, predictions, columns, undetermined, ties)
+    return Fit(fitted, chosen, factors, covariance, predictions, columns, undetermined, ties, beside)
 
 
 def sensitivities(bench: Bench, vector: Vector, x: Array) -> Array:
@@ -239,8 +244,27 @@ def correlation(rest: Array, blocks: NDArray[np.int64]) -> float:
     return float(np.clip(ratio, 1.0, counts[used].mean()))
 
 
-def robust_covariance(columns: Array, rest: Array, blocks: NDArray[np.int64], priors: Array) -> Array:
-    """Covariance of the free numbers, clusters being blocks of time, shape (p, p)."""
+def robust_covariance(
+    columns: Array,
+    rest: Array,
+    blocks: NDArray[np.int64],
+    priors: Array,
+    beside: tuple[Array, Array] | None = None,
+) -> Array:
+    """Covariance of the free numbers, clusters being blocks of time, shape (p, p).
+
+    Args:
+        columns: sensitivities to the free numbers, shape (rows, p).
+        rest: what the fit leaves, shape (rows,).
+        blocks: shape (rows,).
+        priors: shape (p,).
+        beside: sensitivities to and prior spreads of numbers that stay where they are.
+    """
+    if beside is not None:
+        whole = robust_covariance(
+            np.hstack([columns, beside[0]]), rest, blocks, np.concatenate([priors, beside[1]])
+        )
+        return whole[: len(priors), : len(priors)]
     p = columns.shape[1]
     count = int(blocks.max()) + 1
     scores = np.zeros((count, p))

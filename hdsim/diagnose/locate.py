@@ -18,6 +18,8 @@ CORNERS = 9
 LOBES = (1.0, 2.0, 3.0, 4.0)
 #: Order spectra: densely up to the first number, at integers up to the second.
 DENSE_ORDER, HIGHEST_ORDER = 4.6, 60
+#: Oscillators that stand for parts that ring: number, damping ratio (neighbours overlap), least frequency.
+OSCILLATORS, DAMPING_RATIO, SLOWEST_HZ = 10, 0.2, 0.5
 #: Samples of which an order spectrum is made.
 SPECTRUM_SAMPLES = 8000
 #: Share of a channel's residual that a line of an order spectrum must hold to be listed.
@@ -150,6 +152,9 @@ def coordinates(bench: Bench, series: Series, residuals: Sequence[Array]) -> dic
         "time_since_reversal": direction * np.log1p(since / 0.02),
         "output_angle": predictor.motor_angle / predictor.ratio,
     }
+    for other, residual in zip(bench.series, residuals, strict=True):
+        if other.record == series.record and other.channel == "motor_torque":
+            found["motor_torque"] = other.measured - residual
     torque = _model_torque(bench, series, residuals)
     if torque is not None:
         found["torque"] = torque
@@ -249,11 +254,14 @@ def _designs(
         if len(corners) < 3:
             continue
         result.append((name, _placed(bench, own, hats(values, corners)), corners))
-        if name in ("velocity", "torque"):
-            # Friction and loss are odd in speed: torque and direction together.
+        if name in ("velocity", "torque", "output_angle"):
+            # Friction and loss are odd in speed: with the direction.
             turned = np.concatenate([everything[k]["direction"][bench.series[k].train] for k in own])
-            both = np.hstack([hats(values, corners), turned[:, None] * hats(np.abs(values), corners)])
+            size = values if name == "output_angle" else np.abs(values)
+            both = np.hstack([hats(values, corners), turned[:, None] * hats(size, corners)])
             result.append((name, _placed(bench, own, both), None))
+    ringing = np.vstack([oscillators(bench, bench.series[k])[bench.series[k].train] for k in own])
+    result.append(("frequency", _placed(bench, own, ringing), None))
     angle = np.concatenate(
         [bench.predictors[bench.series[k].record].motor_angle[bench.series[k].train] for k in own]
     )
@@ -264,6 +272,28 @@ def _designs(
     harmonics = np.column_stack([part for a in turning for part in (np.sin(a), np.cos(a))])
     result.append(("wave_generator_angle", _placed(bench, own, harmonics), None))
     return result
+
+
+def oscillators(bench: Bench, series: Series) -> Array:
+    """What oscillators of several frequencies do when the motion shakes them, shape (n, 2 OSCILLATORS).
+
+    x'' + 2 d w x' + w^2 x = -a with the motor's acceleration a: a part that hangs on the drive by a spring
+    leaves a sum of such x and x' in torque and angle.
+    """
+    from scipy.signal import bilinear, lfilter
+
+    predictor = bench.predictors[series.record]
+    rate = 1.0 / predictor.record.period_s
+    slowest = max(SLOWEST_HZ, 3.0 / predictor.record.duration_s)
+    columns = []
+    for frequency in np.geomspace(slowest, 0.1 * rate, OSCILLATORS):
+        w = 2 * np.pi * frequency
+        bottom = [1.0, 2.0 * DAMPING_RATIO * w, w * w]
+        columns += [
+            lfilter(*bilinear(top, bottom, rate), predictor.motor_acceleration)
+            for top in ([0.0, 0.0, w * w], [0.0, w, 0.0])
+        ]
+    return np.column_stack(columns)
 
 
 def hats(values: Array, corners: Array) -> Array:

@@ -390,7 +390,7 @@ def _fitted(bench: Bench, base: Fit, added: Added) -> Fit | None:
             found.append(
                 fit(bench, state, frees, held_effects=len(base.state.added), prune=False,
                     evaluations=evaluations,
-                    theta=theta)
+                    theta=theta, beside=base.beside)
             )  # fmt: skip
         except (PredictionError, np.linalg.LinAlgError):
             continue

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, base_intervals, fit
+from hdsim.diagnose.fit import Fit, Vector, base_intervals, fit, robust_covariance, sensitivities
 from hdsim.diagnose.freedom import Free, Interval, State, base_freedoms
 from hdsim.diagnose.measured import Array
 
@@ -56,6 +56,14 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     found = fit(bench, state, found.frees, theta=theta, prune=False, evaluations=5)
     found.undetermined, found.ties = undetermined, ties
     align(bench, found)
+    if undetermined and found.frees:
+        unknown = Vector(found.state, tuple(undetermined), 0)
+        found.beside = sensitivities(bench, unknown, unknown.start()), unknown.priors()
+        rest = bench.stacked(bench.residuals(found.predictions))
+        priors = np.array([free.prior for free in found.frees])
+        found.covariance = robust_covariance(
+            found.columns, rest, bench.stacked_blocks(), priors, found.beside
+        )
     reweigh(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
 
@@ -71,5 +79,8 @@ def reweigh(bench: Bench, found: Fit) -> None:
     old = np.array([series.sigma for series in bench.series])
     bench.weigh(bench.residuals(found.predictions))
     new = np.array([series.sigma for series in bench.series])
+    change = (old / new)[bench.stacked_series()][:, None]
     if found.columns.size:
-        found.columns *= (old / new)[bench.stacked_series()][:, None]
+        found.columns *= change
+    if found.beside is not None:
+        found.beside = found.beside[0] * change, found.beside[1]

@@ -118,7 +118,9 @@ def _matters(bench: Bench, base: Fit, before: Fit, new: Named, others: list[Name
 
 def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
     """All numbers fitted together: the base's and those of all effects."""
-    return fit(bench, state or found.state, at_present(found), evaluations=4, prune=False)
+    return fit(
+        bench, state or found.state, at_present(found), evaluations=4, prune=False, beside=found.beside
+    )
 
 
 def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:

@@ -37,7 +37,8 @@ def smoothed(time: Array, values: Array) -> tuple[Array, Array]:
         pieces = int((n - 1) / spacing)
         if pieces < 4:
             break
-        inner = np.linspace(time[0], time[-1], pieces + 1)[1:-1]
+        # Uniform in samples, so that a gap in the clock leaves no piece without any.
+        inner = np.interp(np.linspace(0, n - 1, pieces + 1)[1:-1], np.arange(n), time)
         knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
         try:
             spline = make_lsq_spline(time, values, knots, k=3)

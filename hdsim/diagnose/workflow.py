@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Share of the weighed residual that must be structured for ``unknown``, and the part of all structure that
 #: the named effects must explain to be believed.
-STRUCTURED, ADEQUATE = 0.12, 0.8
+STRUCTURED, ADEQUATE = 0.12, 0.9
 #: Least relative fall of a held-out gap for the verdict ``parameter``.
 LEAST_FALL = 0.03
 
