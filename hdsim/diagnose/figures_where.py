@@ -69,7 +69,7 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
             else [grid[k // 2, k % 2] for k in range(4)[: len(panels) + 1]]
         )
         axes_of = [figure.add_subplot(place) for place in places]
-        _shares(axes_of[0], shown[:MOST_BARS])
+        _shares(axes_of[0], shown[:MOST_BARS], room=10 if len(panels) == 2 else 5)
         changed = diagnosis.verdict.verdict == "effect" or diagnosis.verdict.curve is not None
         for axes, place in zip(axes_of[1:], panels, strict=True):
             if place.coordinate == "wave_generator_angle":
@@ -83,6 +83,8 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
 def _panels(shown: Sequence[Place]) -> list[Place]:
     """Places that get a picture: the best of each channel first, then further quantities."""
     telling = [place for place in shown if place.share >= NEAR * shown[0].share]
+    if any(place.coordinate == "velocity" for place in telling):
+        telling = [place for place in telling if place.coordinate != "direction"]  # velocity shows it too
     first = {place.channel: place for place in reversed(telling)}
     chosen = [place for place in telling if first[place.channel] is place]
     for place in telling:
@@ -100,7 +102,7 @@ def _distinct(places: Sequence[Place]) -> list[Place]:
     return list(found.values())
 
 
-def _shares(axes: Axes, places: Sequence[Place]) -> None:
+def _shares(axes: Axes, places: Sequence[Place], room: int) -> None:
     for k, place in enumerate(places):
         axes.barh(k, 100 * place.share, 0.68, color=REFIT)
         axes.text(100 * place.share + 1.5, k, f"{100 * place.share:.0f} %", va="center", fontsize=8.5)
@@ -115,7 +117,7 @@ def _shares(axes: Axes, places: Sequence[Place]) -> None:
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("share of what the re-fitted model leaves (%)")
     axes.set_title("Share by quantity")
-    axes.set_ylim(max(len(places), 5) - 0.4, -0.6)
+    axes.set_ylim(max(len(places), room) - 0.4, -0.6)
 
 
 def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, *, after: bool) -> None:
@@ -125,7 +127,7 @@ def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, 
     where = coordinates(bench, series, rest["refit"])
     used = np.flatnonzero(series.train)
     values = {stage: residuals[index][used] for stage, residuals in rest.items()}
-    low, high = np.quantile(values["refit"], [0.002, 0.998])
+    low, high = np.quantile(values["refit"], [0.01, 0.99])
     unit = _unit(place.channel, max(abs(low), abs(high)))
     x = where[place.coordinate][used]
     label, name = LABELS.get(place.coordinate, (spoken(place.coordinate), ""))
@@ -154,7 +156,7 @@ def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, 
 
 
 def _limits(low: float, high: float) -> tuple[float, float]:
-    room = 0.25 * max(high - low, 1e-12)
+    room = 0.4 * max(high - low, 1e-12)
     return low - room, high + room
 
 

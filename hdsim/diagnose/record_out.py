@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from hdsim.diagnose.measured import CHANNELS
 from hdsim.recording import Column, Recording, Table
@@ -11,11 +14,26 @@ if TYPE_CHECKING:
     from hdsim.diagnose.workflow import Diagnosis
 
 
+LOG, LAYOUT = "compared.mcap", "diagnose.json"
+
+
+def write_compared(diagnosis: Diagnosis, folder: Path) -> None:
+    """Write the log and, beside it, the layout that shows it: ``compared.mcap`` and ``diagnose.json``."""
+    from hdsim.log.info import info_log
+    from hdsim.log.layout import build_layout, to_json
+
+    about = info_log(side_by_side(diagnosis).save(folder / LOG))
+    layout = build_layout("diagnose", topics=about.fields, duration=about.duration)
+    (folder / LAYOUT).write_text(to_json(layout), encoding="utf-8")
+
+
 def side_by_side(diagnosis: Diagnosis) -> Recording:
     """The first record with tables ``measured``, ``before``, ``refit`` and ``after`` over the same times.
 
     Angles and torques are in SI units; the models' offsets against the sensors are removed, as in the fits.
     Where the output's angle is predicted, ``transmission_error`` is it less the motor's angle over the ratio.
+    The columns ``..._error`` of a model are measured less predicted, NaN where the measurement is not
+    to be trusted.
     """
     bench = diagnosis.bench
     predictor = bench.predictors[0]
@@ -32,7 +50,10 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
         for stage, residuals in stages.items():
             values = series.measured - residuals[k]
             table = columns.setdefault(stage, {})
-            table[series.channel] = Column(values, CHANNELS[series.channel], f"model, {stage}")
+            unit = CHANNELS[series.channel]
+            table[series.channel] = Column(values, unit, f"model, {stage}")
+            left = np.where(record.trusted[series.channel], residuals[k], np.nan)
+            table[f"{series.channel}_error"] = Column(left, unit, f"measured less model, {stage}")
             if series.channel == "output_angle":
                 table["transmission_error"] = Column(values - ideal, "rad", f"model, {stage}")
         if series.channel == "output_angle":

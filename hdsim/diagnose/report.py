@@ -99,6 +99,7 @@ def _page(diagnosis: Diagnosis, pictures: dict[str, str]) -> str:
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",
+        f"<meta name='description' content='{html.escape(verdict.sentence)}'>",
         f"<title>{KINDS[verdict.verdict]}: hdsim diagnose</title>",
         f"<style>{css}:root{{--kind:var(--{verdict.verdict})}}</style></head><body><main>",
         _origin(diagnosis),
@@ -152,13 +153,11 @@ def _head(diagnosis: Diagnosis) -> str:
     sure = sureness(diagnosis)
     said = headline(verdict)
     long = " class='long'" if len(said) > LONG else ""
-    same = said == verdict.sentence
-    sentence = "" if same else f"<p class='note'>{html.escape(verdict.sentence)}</p>"
     listed = "".join(f"<li>{html.escape(line)}</li>" for line in gains(verdict))
     unseen = "Gap on data that no fit has seen:" if verdict.gap else "No data were held out."
     return (
         f"<header class='verdict'><p class='kind'>{KINDS[verdict.verdict]}</p>"
-        f"<h1{long}>{html.escape(said)}</h1>{sentence}<div class='facts'>"
+        f"<h1{long}>{html.escape(said)}</h1><div class='facts'>"
         f"<div><h2>How sure</h2><p class='big'>{html.escape(sure.words)}: "
         f"<span class='number'>{html.escape(sure.number)}</span></p>"
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from hdsim.diagnose.name import LEVEL
 from hdsim.diagnose.verdict import FittedNumber, Gap, NamedEffect, Verdict
 from hdsim.plot import units
 
@@ -112,8 +113,8 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
             here = None
         if part.isdigit() and isinstance(here, Mapping) and "order" in here:
             # The order tells more than the name of the list and the place in it.
-            turn = spoken(str(here.get("per", "wave_generator_turn")))
-            sections[-1:] = [f"order {here['order']:g} per {turn}"]
+            turn = f" per {spoken(here['per'])}" if here.get("per") else ""
+            sections[-1:] = [f"order {here['order']:g}{turn}"]
         elif part != "drive":
             sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
     return ", ".join([*sections, spoken(last)]), unit
@@ -171,31 +172,38 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
     if verdict.verdict == "unknown":
         chance = min(stage.location.chance for stage in diagnosis.stages)
         share = max(stage.location.structured for stage in diagnosis.stages)
-        said = (
+        said = [
             f"The chance to see so much of a pattern in pure noise is {below(chance)}.",
             f"{percent(share)} of what the model leaves, weighed by the noise, is that pattern; the named "
             f"effects "
             "explain too little of it.",
+        ]
+        return Sureness("Sure that something is missing, not what", f"chance {below(chance)}", tuple(said))
+    if last <= LEVEL:
+        nothing_more = (
+            f"An effect of the catalogue explains more than chance does ({below(last)}), but too little, or "
+            "not when fitted in full, to be named."
         )
-        return Sureness("Sure that something is missing, not what", f"chance {below(chance)}", said)
-    nothing_more = (
-        "Nothing more is seen: where nothing is missing, some effect of the catalogue looks as good by "
-        "chance "
-        f"in {percent(last)} of cases (one is named only below 2 %)."
-        if search and search[-1].ranked
-        else "No effect of the catalogue could be tried on these data."
-    )
+    else:
+        nothing_more = (
+            "Nothing more is seen: where nothing is missing, some effect of the catalogue looks as good by "
+            "chance "
+            f"in {percent(last)} of cases (one is named only below {percent(LEVEL)})."
+            if search and search[-1].ranked
+            else "No effect of the catalogue could be tried on these data."
+        )
     if verdict.verdict == "parameter":
         far = farthest(verdict)
         number = f"{far:.2g} standard errors" if far < 100 else "over 100 standard errors"
-        said = (f"The number that moved farthest lies {number} from the model's.", nothing_more)
-        return Sureness(_word(_FAR, far), number, said)
+        said = [f"The number that moved farthest lies {number} from the model's.", nothing_more]
+        return Sureness(_word(_FAR, far), number, tuple(said))
     ratios = [gap.after / gap.noise for gap in verdict.gap.values() if gap.noise > 0]
     worst = max(ratios, default=math.nan)
-    said = (nothing_more,)
+    said = [nothing_more]
     if ratios:
-        said += (f"What is left is at most {worst:.2g} times the noise of its channel.",)
-    return Sureness("No sign of anything missing", f"{percent(last)} by chance", said)
+        said.append(f"What is left is at most {worst:.2g} times the noise of its channel.")
+    words = "No sign of anything missing" if last > LEVEL else "Nothing that can be named"
+    return Sureness(words, f"{percent(last)} by chance", tuple(said))
 
 
 def _of_effects(effects: Sequence[NamedEffect]) -> Sureness:
@@ -206,16 +214,21 @@ def _of_effects(effects: Sequence[NamedEffect]) -> Sureness:
         words += (
             " that it is one of these, not which" if len(effects) == 1 else ", up to the alternatives given"
         )
-    said = []
-    for effect in effects:
-        alone = "it or one of its group" if effect.indistinguishable_from else "it"
-        alone = alone if len(effects) > 1 else alone[:1].upper() + alone[1:]
-        title = f"{effect.title or spoken(effect.name)}: " if len(effects) > 1 else ""
-        said.append(
-            f"{title}{alone} is the best explanation in {percent(effect.confidence)} of resampled records. "
-            f"Where "
-            f"nothing is missing, the whole search finds as much in {below(effect.chance)} of cases."
-        )
+    if len(effects) == 1:
+        who = "It or one of its group" if groups else "It"
+        said = [
+            f"{who} is the best explanation in {percent(weakest.confidence)} of resampled records.",
+            f"Where nothing is missing, the whole search finds as much in {below(weakest.chance)} of cases.",
+        ]
+        return Sureness(words, percent(weakest.confidence), tuple(said))
+    said = [
+        f"{effect.title or spoken(effect.name)}: {percent(effect.confidence)} and {below(effect.chance)}."
+        for effect in effects
+    ]
+    said.append(
+        "First, how often it (or one of its group) is the best explanation in resampled records; second, how "
+        "often the whole search finds as much where nothing is missing."
+    )
     return Sureness(words, percent(weakest.confidence), tuple(said))
 
 

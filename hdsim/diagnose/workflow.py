@@ -267,7 +267,7 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
         InputError: ``out`` cannot be written.
     """
     from hdsim.diagnose.add import scenario_text
-    from hdsim.diagnose.record_out import side_by_side
+    from hdsim.diagnose.record_out import write_compared
     from hdsim.diagnose.report import write_report
 
     out = Path(out)
@@ -275,12 +275,12 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
     with staged(out) as stage:
         # What an earlier diagnosis found must not stay beside this one's verdict.
         (out / "found.yaml").unlink(missing_ok=True)
-        if verdict.verdict in ("effect", "parameter"):
+        if verdict.verdict in ("effect", "parameter") or verdict.curve is not None:
             state, freedoms = diagnosis.final.state, diagnosis.refit.freedoms
             text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
             (stage / "found.yaml").write_text(text, encoding="utf-8")
             verdict.scenario = str(out / "found.yaml")
-        side_by_side(diagnosis).save(stage / "compared.mcap")
+        write_compared(diagnosis, stage)
         (stage / "verdict.json").write_text(verdict.model_dump_json(indent=2), encoding="utf-8")
         report = write_report(diagnosis, stage)
     return out / report.name

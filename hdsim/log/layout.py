@@ -145,6 +145,10 @@ def diagnose() -> Split:
         paths = [f"/hd/{run}_view.{channel}" for run in ("after", "before", "measured")]
         return plot(title, *paths, styles=(_AFTER_STYLE, _BEFORE_STYLE, _MEASURED_STYLE))
 
+    def left(title: str, channel: str) -> Panel:
+        paths = [f"/hd/{run}_view.{channel}" for run in ("after", "before")]
+        return plot(title, *paths, styles=(_AFTER_STYLE, _BEFORE_STYLE))
+
     return row(
         (
             50,
@@ -157,9 +161,12 @@ def diagnose() -> Split:
         (
             50,
             column(
-                (34, three("Output angle [rad]", "output_angle")),
-                (33, three("Motor velocity [rad/s]", "motor_velocity")),
-                (33, events()),
+                (22, left("Measured less model: output angle [arcsec]", "output_angle_error_arcsec")),
+                (22, left("Measured less model: output torque [N m]", "output_torque_error")),
+                (22, left("Measured less model: motor torque [N m]", "motor_torque_error")),
+                (17, three("Output angle [rad]", "output_angle")),
+                (17, three("Motor velocity [rad/s]", "motor_velocity")),
+                (17, events()),
             ),
         ),
     )

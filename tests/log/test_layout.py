@@ -37,7 +37,10 @@ def leaves(tree):
 def diagnosed(tmp_path_factory):
     """A log that every layout can show."""
     run = drive_run()
-    tables = {**run.tables, **dict.fromkeys(("measured", "before", "after"), run.state)}
+    # A diagnosis writes what each model leaves of the measured channels beside what it predicts.
+    left = {f"{name}_error": run.channels[name] for name in ("output_angle", "output_torque", "motor_torque")}
+    model = Table(run.time, {**run.channels, **left})
+    tables = {**run.tables, "measured": run.state, "before": model, "after": model}
     recording = Recording(tables, run.static, run.events, run.metadata)
     return write_log(recording, tmp_path_factory.mktemp("log") / "a.mcap")
 
