@@ -214,8 +214,12 @@ def find_spikes(values: Array, trusted: Mask) -> Mask:
     from scipy.ndimage import label, median_filter
 
     filled = np.interp(np.arange(len(values)), np.flatnonzero(trusted), values[trusted])
-    middle = median_filter(filled, SPIKE_WINDOW, mode="nearest")
-    deviation = np.abs(filled - middle)
+    # Along the local slope, or a spike on a ramp would shift the median for its neighbours.
+    slope = median_filter(np.gradient(filled), SPIKE_WINDOW, mode="nearest")
+    reach = SPIKE_WINDOW // 2
+    padded = np.pad(filled, reach, mode="edge")
+    shifted = [padded[reach + k : reach + k + len(filled)] - k * slope for k in range(-reach, reach + 1)]
+    deviation = np.abs(filled - np.median(shifted, axis=0))
     # The local scale keeps the corners of a fast motion from being taken for spikes.
     local = median_filter(deviation, 5 * SPIKE_WINDOW, mode="nearest") / 0.6745
     scale = np.maximum(local, noise_floor(values, trusted))

@@ -52,7 +52,7 @@ def record_of(case: Case, log: Log) -> Record:
         lines = []
         for name in log.channels:
             side = name.partition("_")[0]
-            unit = {"angle": "rad", "torque": "Nm"}[name.rpartition("_")[2]]
+            unit = {"angle": "rad", "torque": "N m"}[name.rpartition("_")[2]]
             lines.append(f"  {name}: {{column: {name}, unit: {unit}, side: {side}}}\n")
         mapping.write_text(MAPPING + "".join(lines), encoding="utf-8")
         return record_from(hdsim.import_recording(table, mapping))
