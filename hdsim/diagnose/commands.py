@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:
-    from hdsim.diagnose.workflow import Diagnosis
 
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 #: A ROS 2 bag is a folder.
@@ -46,6 +43,7 @@ def diagnose(
     import hdsim
     from hdsim.diagnose.measured import record_from
     from hdsim.diagnose.staging import staged
+    from hdsim.diagnose.terminal import Progress, show
     from hdsim.diagnose.workflow import diagnose as run
     from hdsim.diagnose.workflow import save
 
@@ -60,7 +58,7 @@ def diagnose(
         [record_from(hdsim.import_recording(path, mapping), path.name) for path in paths]
         for paths in (measured, holdout)
     )
-    with _Progress() as tell:
+    with Progress() as tell:
         found = run(records, scenario, holdout=held, load=load, force=force, on_step=tell)
         tell("writing the report")
         report = save(found, model, out)
@@ -68,42 +66,6 @@ def diagnose(
     click.echo(f"report   {report}")
     if found.verdict.scenario:
         click.echo(f"scenario {found.verdict.scenario}")
+    if found.verdict.next_experiment is not None and found.verdict.next_experiment.scenario:
+        click.echo(f"next     {found.verdict.next_experiment.scenario}")
     return 0
-
-
-def show(found: Diagnosis) -> None:
-    """Print the verdict and the gap table."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from hdsim.diagnose.report import GAP_HEAD, gap_rows
-
-    verdict = found.verdict
-    console = Console()
-    console.print(f"[bold]{verdict.verdict}[/bold]  {verdict.sentence}", highlight=False)
-    table = Table(*GAP_HEAD, title="RMS difference on held-out data", title_justify="left")
-    for row in gap_rows(verdict):
-        table.add_row(*row)
-    console.print(table)
-    for problem in verdict.data_problems:
-        if problem.severity != "info":
-            line = f"{problem.severity}: {problem.record}: {problem.channel}: {problem.message}"
-            console.print(line, highlight=False, markup=False)
-
-
-class _Progress:
-    """A line that says what is being done, on a terminal; nothing elsewhere."""
-
-    def __enter__(self) -> Any:
-        from rich.console import Console
-
-        console = Console(stderr=True)
-        self._status = console.status("") if console.is_terminal else None
-        if self._status is None:
-            return lambda text: None
-        self._status.start()
-        return self._status.update
-
-    def __exit__(self, *_: object) -> None:
-        if self._status is not None:
-            self._status.stop()

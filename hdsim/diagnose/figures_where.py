@@ -138,14 +138,15 @@ def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, 
     axes.plot(
         x[::thin], unit.factor * values["refit"][::thin], ".", markersize=2, color="#9A9A9A", alpha=0.45
     )
+    timed = place.coordinate == "time"
     turned = where["direction"][used]
     if place.coordinate in _LOOPS and len(np.unique(turned)) > 1:
         _mean(axes, x[turned > 0], unit.factor * values["refit"][turned > 0], BEFORE, "left, forwards", "-")
         _mean(axes, x[turned < 0], unit.factor * values["refit"][turned < 0], BEFORE, "left, backwards", "--")
     else:
-        _mean(axes, x, unit.factor * values["refit"], BEFORE, "left by the re-fitted model", "-")
+        _mean(axes, x, unit.factor * values["refit"], BEFORE, "left by the re-fitted model", gaps=timed)
     if after:
-        _mean(axes, x, unit.factor * values["after"], AFTER, "left after", "-")
+        _mean(axes, x, unit.factor * values["after"], AFTER, "left after", gaps=timed)
     axes.set_ylim(*_limits(unit.factor * low, unit.factor * high))
     axes.set_xlabel(f"{label} ({name})" if name else label)
     axes.set_ylabel(f"measured less model ({unit.name})")
@@ -160,8 +161,10 @@ def _limits(low: float, high: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _mean(axes: Axes, x: Array, values: Array, colour: str, label: str, line: str) -> None:
-    """Draw the mean of ``values`` over bins of ``x`` that hold equally many samples."""
+def _mean(
+    axes: Axes, x: Array, values: Array, colour: str, label: str, line: str = "-", *, gaps: bool = False
+) -> None:
+    """Draw the mean of ``values`` over bins of equally many samples; with ``gaps`` not across holes."""
     edges = np.unique(np.quantile(x, np.linspace(0, 1, 41))) if len(x) > 80 else np.zeros(0)
     if len(edges) < 4:
         kinds = np.unique(x)
@@ -172,9 +175,9 @@ def _mean(axes: Axes, x: Array, values: Array, colour: str, label: str, line: st
     inside = np.clip(np.searchsorted(edges, x) - 1, 0, len(edges) - 2)
     count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
     at, mean = (np.bincount(inside, v, len(edges) - 1) / count for v in (x, values))
-    # No line across a stretch without samples.
-    hole = 1 + np.flatnonzero(np.diff(at) > 6.0 * np.median(np.diff(at)))
-    at, mean = np.insert(at, hole, np.nan), np.insert(mean, hole, np.nan)
+    if gaps:
+        hole = 1 + np.flatnonzero(np.diff(at) > 6.0 * np.median(np.diff(at)))
+        at, mean = np.insert(at, hole, np.nan), np.insert(mean, hole, np.nan)
     axes.plot(at, mean, line, color=colour, linewidth=1.8, label=label)
 
 

@@ -38,18 +38,14 @@ LONG = 150
 
 _CAPTIONS = {
     "gap": "Root-mean-square difference between measurement and model on data that no fit has seen, in the "
-    "unit "
-    "of each channel (in brackets: as a share of the model as given). Whiskers: 95 % intervals over blocks "
-    "of "
-    "time. Dashed line: noise of the sensor, below which no model can come.",
+    "unit of each channel (in brackets: as a share of the model as given). Whiskers: 95 % intervals over "
+    "blocks of time. Dashed line: noise of the sensor, below which no model can come.",
     "located": "How much of what the re-fitted model leaves is a function of one quantity, checked on "
-    "blocks of "
-    "time left out of the fit; the shares of related quantities overlap. Grey: measured samples. Orange: "
-    "what "
-    "the re-fitted model leaves. Green: what is left with what was found.",
+    "blocks of time left out of the fit; the shares of related quantities overlap. Grey: measured samples. "
+    "Orange: what the re-fitted model leaves. Green: what is left with what was found.",
     "traces": "The stretch of held-out data in which the model as given is farthest off. Grey band: "
-    "twice "
-    "the sensor's noise to either side; what stays inside is explained. Sensors' offsets are taken out.",
+    "twice the sensor's noise to either side; what stays inside is explained. Sensors' offsets are taken "
+    "out.",
     "whole": "The same difference over the whole record. Shaded: held out, no fit has seen it.",
     "curve": "The curve that is missing, with the 95 % interval of each corner. What the model's own numbers "
     "could explain as well, such as a constant, is left out.",
@@ -88,8 +84,8 @@ def write_report(diagnosis: Diagnosis, out: Path) -> Path:
 def _figure(name: str, content: bytes) -> str:
     data = base64.b64encode(content).decode()
     return (
-        f"<figure><img alt='{_ALTS[name]}' src='data:image/png;base64,{data}'>"
-        f"<figcaption>{_CAPTIONS[name]}</figcaption></figure>"
+        f"<figure><img alt='{_ALTS[name]}' "
+        f"src='data:image/png;base64,{data}'><figcaption>{_CAPTIONS[name]}</figcaption></figure>"
     )
 
 
@@ -156,14 +152,14 @@ def _head(diagnosis: Diagnosis) -> str:
     listed = "".join(f"<li>{html.escape(line)}</li>" for line in gains(verdict))
     unseen = "Gap on data that no fit has seen:" if verdict.gap else "No data were held out."
     return (
-        f"<header class='verdict'><p class='kind'>{KINDS[verdict.verdict]}</p>"
-        f"<h1{long}>{html.escape(said)}</h1><div class='facts'>"
-        f"<div><h2>How sure</h2><p class='big'>{html.escape(sure.words)}: "
-        f"<span class='number'>{html.escape(sure.number)}</span></p>"
+        "<header class='verdict'><p "
+        f"class='kind'>{KINDS[verdict.verdict]}</p><h1{long}>{html.escape(said)}</h1><div "
+        f"class='facts'><div><h2>How sure</h2><p class='big'>{html.escape(sure.words)}: <span "
+        f"class='number'>{html.escape(sure.number)}</span></p>"
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)
         + f"</div><div><h2>What it "
-        f"means</h2><p>{html.escape(MEANINGS[verdict.verdict])}</p>{_pointers(verdict)}"
-        f"</div><div><h2>What it gains</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
+        f"means</h2><p>{html.escape(MEANINGS[verdict.verdict])}</p>{_pointers(verdict)}</div><div><h2>What "
+        f"it gains</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
     )
 
 
@@ -189,7 +185,7 @@ def _confusions(verdict: Verdict) -> str:
         own, *others = titles_of(effect)
         lines = ""
         for name, title in zip(effect.indistinguishable_from, others, strict=True):
-            rule = effect.separated_by.get(name) or "no rule is known"
+            rule = effect.separated_by.get(name) or "no rule is recorded"
             lines += f"<li><b>{html.escape(title)}</b>. What separates the two: {html.escape(rule)}.</li>"
         body += f"<p>These data cannot tell <b>{html.escape(own)}</b> from:</p><ul>{lines}</ul>"
     if verdict.suspects:
@@ -213,12 +209,11 @@ def _next(verdict: Verdict) -> str:
             f"<code>hdsim run {html.escape(proposal.scenario)}</code> shows what the model expects.</p>"
         )
     body += (
-        f"<p class='note'>d′ is the distance between the two candidates that are hardest to tell apart, in "
-        f"standard deviations of the noise, after each has been fitted to the other as well as it can be: "
-        f"1 is a "
-        f"guess that is right in 69 % of cases, 3 in 93 %, more is safe. Here {proposal.separation:.2g} is "
-        f"expected, "
-        f"which is right in {percent(proposal.correct)} of cases if the noise is all that is unknown.</p>"
+        "<p class='note'>d′ is the distance between the two candidates that are hardest to tell apart, in "
+        "standard deviations of the noise, after each has been fitted to the other as well as it can be: 1 "
+        f"is a guess that is right in 69 % of cases, 3 in 93 %, more is safe. Here {proposal.separation:.2g} "
+        f"is expected, which is right in {percent(proposal.correct)} of cases if the noise is all that is "
+        "unknown.</p>"
     )
     head = ("experiment", "expected d′", "against repeating the record")
     return f"<section id='next'><h2>What to measure next</h2>{body}{table(head, rows, (1, 2))}</section>"
@@ -237,9 +232,8 @@ def _curve(verdict: Verdict, pictures: dict[str, str]) -> str:
         f"{words} ({percent(share)})" for words, share in curve.tried.items() if words != curve.words
     )
     body = (
-        f"<p><b>{html.escape(curve.words[:1].upper() + curve.words[1:])}</b> explains "
-        f"{percent(curve.share)} of what the "
-        "model leaves (checked on blocks of time left out of the fit).</p>"
+        f"<p><b>{html.escape(curve.words[:1].upper() + curve.words[1:])}</b> explains {percent(curve.share)} "
+        "of what the model leaves (checked on blocks of time left out of the fit).</p>"
         + pictures.get("curve", "")
         + (f"<p class='note'>Other curves that were tried: {html.escape(others)}.</p>" if others else "")
         + f"<details><summary>its corners as numbers</summary>{table(head, rows, (0, 1, 2))}</details>"
@@ -258,8 +252,7 @@ def _fitted(diagnosis: Diagnosis) -> str:
         body += "<h3>The model's own numbers</h3>" + numbers_table(verdict.parameters, verdict.moved)
         body += (
             "<p class='note'>Marked at the left: the model's number lies outside the interval. Intervals "
-            "come from "
-            "the spread over blocks of time, not from the noise alone.</p>"
+            "come from the spread over blocks of time, not from the noise alone.</p>"
         )
     return _section("Fitted numbers", body) if body else ""
 
@@ -275,37 +268,37 @@ def _data(verdict: Verdict) -> str:
     )
     head = "".join(f"<th>{h}</th>" for h in ("", "record", "channel", "kind", "what was found"))
     return (
-        "<section id='data'><h2>Problems in the data</h2><div class='wide'>"
-        f"<table><tr>{head}</tr>{lines}</table></div></section>"
+        "<section id='data'><h2>Problems in the data</h2><div "
+        f"class='wide'><table><tr>{head}</tr>{lines}</table></div></section>"
     )
 
 
 def _not_tried(verdict: Verdict) -> str:
     if not verdict.not_tried:
         return ""
-    rows = [[spoken(name), why] for name, why in verdict.not_tried.items()]
-    return _section("Effects that were not tried", table(("effect", "why"), rows))
+    reasons: dict[str, list[str]] = {}
+    for name, why in verdict.not_tried.items():
+        reasons.setdefault(why, []).append(spoken(name))
+    rows = [[", ".join(names), why] for why, names in reasons.items()]
+    return _section("Effects that were not tried", table(("effects", "why"), rows))
 
 
 def _method(diagnosis: Diagnosis) -> str:
     held = diagnosis.bench.training < len(diagnosis.bench.predictors)
     proof = "the records given for it" if held else "every third stretch of each record"
     steps = (
-        "The measured motion is prescribed to the model, which predicts the other channels; controllers and "
-        "commands play no part.",
+        "The measured motion is prescribed to the model, which predicts the other channels; controllers "
+        "and commands play no part.",
         "The model's own numbers are fitted first, so that nothing is called missing that a better number "
         "explains.",
         "What is left is looked for over time, speed, direction, angle, torque and temperature, and in "
-        "orders of "
-        "the wave generator's turn.",
+        "orders of the wave generator's turn.",
         "Every effect of the catalogue is simulated in the re-fitted model. Its trace must explain blocks "
-        "of time "
-        "that it has not seen; the best are fitted in full.",
+        "of time that it has not seen; the best are fitted in full.",
         f"An effect is named only if its share is at least {percent(LEAST_SHARE)}, and fewer than "
-        f"{percent(LEVEL)} of 400 "
-        "repetitions of the whole search on residuals with signs turned at random do as well: this bounds "
-        "false "
-        f"alarms of the search, not of one test. The gap is computed on {proof}.",
+        f"{percent(LEVEL)} of 400 repetitions of the whole search on residuals with signs turned at random "
+        "do as well: this bounds false alarms of the search, not of one test. The gap is computed on "
+        f"{proof}.",
     )
     listed = "".join(f"<li>{html.escape(step)}</li>" for step in steps)
     spent = sum(diagnosis.verdict.seconds.values())

@@ -22,13 +22,11 @@ KINDS = {
 }
 MEANINGS = {
     "nothing": "The model has all that these data show: what it does not predict looks like noise. Effects "
-    "too "
-    "weak to be seen here, or not excited by this motion, may still be there.",
+    "too weak to be seen here, or not excited by this motion, may still be there.",
     "parameter": "The model has the right parts, but some of its numbers do not fit this machine. With the "
     "fitted numbers below, no further effect is seen.",
     "effect": "A known physical effect that the model does not have explains what no change of the model's "
-    "own "
-    "numbers can. It is added, with fitted numbers, in found.yaml.",
+    "own numbers can. It is added, with fitted numbers, in found.yaml.",
     "unknown": "A pattern is left that repeats, and no known effect explains it well enough to be named. "
     "Better no name than a wrong one: it is given as a curve instead.",
 }
@@ -175,8 +173,7 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
         said = [
             f"The chance to see so much of a pattern in pure noise is {below(chance)}.",
             f"{percent(share)} of what the model leaves, weighed by the noise, is that pattern; the named "
-            f"effects "
-            "explain too little of it.",
+            "effects explain too little of it.",
         ]
         return Sureness("Sure that something is missing, not what", f"chance {below(chance)}", tuple(said))
     if last <= LEVEL:
@@ -187,8 +184,7 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
     else:
         nothing_more = (
             "Nothing more is seen: where nothing is missing, some effect of the catalogue looks as good by "
-            "chance "
-            f"in {percent(last)} of cases (one is named only below {percent(LEVEL)})."
+            f"chance in {percent(last)} of cases (one is named only below {percent(LEVEL)})."
             if search and search[-1].ranked
             else "No effect of the catalogue could be tried on these data."
         )
@@ -222,13 +218,11 @@ def _of_effects(effects: Sequence[NamedEffect]) -> Sureness:
         ]
         return Sureness(words, percent(weakest.confidence), tuple(said))
     said = [
-        f"{effect.title or spoken(effect.name)}: {percent(effect.confidence)} and {below(effect.chance)}."
+        f"{effect.title or spoken(effect.name)}: best in {percent(effect.confidence)} of resampled records; "
+        f"by chance in {below(effect.chance)}."
         for effect in effects
     ]
-    said.append(
-        "First, how often it (or one of its group) is the best explanation in resampled records; second, how "
-        "often the whole search finds as much where nothing is missing."
-    )
+    said.append("By chance: how often the whole search finds as much where nothing is missing.")
     return Sureness(words, percent(weakest.confidence), tuple(said))
 
 

@@ -1,0 +1,103 @@
+"""What a diagnosis shows on a terminal: a bar while it runs, then the verdict and the gap table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from hdsim.console import console
+from hdsim.diagnose.tables import gap_rows
+from hdsim.diagnose.wording import KINDS, headline, sureness
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from hdsim.diagnose.workflow import Diagnosis
+
+#: How far a diagnosis is, in percent, when it says that it begins with this. Locating and naming are repeated
+#: as long as something is found, so that the bar waits there.
+STEPS = {
+    "checking the data": 2,
+    "predicting": 5,
+    "re-fitting": 10,
+    "locating": 35,
+    "screening": 40,
+    "fitting the shortlist": 55,
+    "asking each name again": 70,
+    "fitting the curve": 75,
+    "proving": 90,
+    "writing the report": 95,
+}
+#: Narrow enough for 80 columns; ``left`` is the gap after over the one before.
+_HEAD = ("channel", "before", "re-fit", "after", "noise", "left", "x noise")
+_STYLE: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "header_style": "bold"}
+_COLOURS = {"nothing": "green", "parameter": "blue", "effect": "dark_orange", "unknown": "magenta"}
+
+
+class Progress:
+    """A bar and a line that says what is being done, on a terminal; nothing elsewhere."""
+
+    def __init__(self, terminal: Console | None = None) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as Bar
+
+        self._console = terminal or Console(stderr=True)
+        columns = (SpinnerColumn(), BarColumn(24), TimeElapsedColumn(), TextColumn("{task.description}"))
+        self._bar = Bar(*columns, console=self._console, transient=True)
+        self._done = 0
+
+    def __enter__(self) -> Callable[[str], object]:
+        if not self._console.is_terminal:
+            return lambda text: None
+        self._bar.start()
+        self._task = self._bar.add_task("", total=100)
+        return self.tell
+
+    def __exit__(self, *_: object) -> None:
+        if self._console.is_terminal:
+            self._bar.stop()
+
+    def tell(self, text: str) -> None:
+        """Show what is being done."""
+        from rich.markup import escape
+
+        reached = [percent for start, percent in STEPS.items() if text.startswith(start)]
+        self._done = max([self._done, *reached])
+        self._bar.update(self._task, completed=self._done, description=escape(text))
+
+
+def show(found: Diagnosis, terminal: Console | None = None) -> None:
+    """Print the verdict, how sure it is, the gap table, and what needs attention."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    verdict, sure = found.verdict, sureness(found)
+    out = terminal or console()
+
+    def line(*parts: tuple[str, str] | str) -> None:
+        out.print(Text.assemble(*parts), highlight=False)
+
+    line((verdict.verdict, f"bold {_COLOURS[verdict.verdict]}"), ": ", (KINDS[verdict.verdict], "bold"))
+    line(headline(verdict))
+    line(f"{sure.words}: {sure.number}.", "")
+    table = Table(box=SIMPLE_HEAD, title="\nRMS difference on held-out data", **_STYLE)
+    for name in _HEAD:
+        table.add_column(name, justify="left" if name == "channel" else "right")
+    for channel, unit, *numbers in gap_rows(verdict):
+        table.add_row(f"{channel} ({unit})", *numbers)
+    out.print(table)
+    for effect in verdict.effects:
+        for other in effect.indistinguishable_from:
+            why = effect.separated_by.get(other)
+            if why:
+                line((f"{effect.name} or {other}", "bold"), f": {why}")
+    if verdict.curve is not None:
+        line(("curve", "bold"), f": {verdict.curve.words}, explains {100 * verdict.curve.share:.0f} %")
+    if verdict.next_experiment is not None:
+        line(("next", "bold"), f": {verdict.next_experiment.sentence}")
+    for problem in verdict.data_problems:
+        if problem.severity != "info":
+            style = "bold red" if problem.severity == "error" else "yellow"
+            line((problem.severity, style), f": {problem.record}: {problem.channel}: {problem.message}")
