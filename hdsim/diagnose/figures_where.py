@@ -28,10 +28,16 @@ LEAST, MOST_BARS, MOST_PANELS = 0.02, 8, 3
 NEAR = 0.35
 #: Samples of which a drawn order spectrum is made, and the number of its orders.
 SPECTRUM_SAMPLES, SPECTRUM_ORDERS = 6000, 700
+#: Length of the pieces of which a spectrum over frequency is averaged, s.
+SPECTRUM_S = 2.0
 #: Coordinates over which the two directions of motion may differ.
-_LOOPS = ("torque", "output_angle", "temperature")
+_LOOPS = ("torque", "motor_torque", "output_angle", "temperature")
 
-SHORT = {"wave_generator_angle": "orders of the wave generator", "torque": "torque at the output"}
+SHORT = {
+    "wave_generator_angle": "orders of the wave generator",
+    "torque": "torque at the output",
+    "frequency": "frequency (something rings)",
+}
 LABELS = {
     "time": ("time", "s"),
     "velocity": ("motor velocity", "rad/s"),
@@ -39,7 +45,9 @@ LABELS = {
     "time_since_reversal": ("direction × log(1 + time since reversal / 20 ms)", ""),
     "output_angle": ("output angle", "rad"),
     "torque": ("torque at the output", "N m"),
+    "motor_torque": ("motor torque of the model", "N m"),
     "temperature": ("temperature", "°C"),
+    "frequency": ("frequency", "Hz"),
     "wave_generator_angle": ("wave-generator angle (orders)", ""),
 }
 
@@ -74,6 +82,8 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
         for axes, place in zip(axes_of[1:], panels, strict=True):
             if place.coordinate == "wave_generator_angle":
                 _spectrum(axes, bench, rest, lines[place.channel], place, after=changed)
+            elif place.coordinate == "frequency":
+                _ringing(axes, bench, rest, place, after=changed)
             else:
                 _over(axes, bench, rest, place, after=changed)
         axes_of[1].legend(loc="best", frameon=True, framealpha=0.8, edgecolor="none")
@@ -82,7 +92,7 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
 
 def _panels(shown: Sequence[Place]) -> list[Place]:
     """Places that get a picture: the best of each channel first, then further quantities."""
-    telling = [place for place in shown if place.share >= NEAR * shown[0].share]
+    telling = [p for p in shown if p.share >= NEAR * shown[0].share and p.coordinate in LABELS]
     if any(place.coordinate == "velocity" for place in telling):
         telling = [place for place in telling if place.coordinate != "direction"]  # velocity shows it too
     first = {place.channel: place for place in reversed(telling)}
@@ -217,6 +227,36 @@ def _spectrum(
     axes.set_xlabel("order: periods per wave-generator turn")
     axes.set_ylabel(f"amplitude ({unit.name})")
     axes.set_title(f"{spoken(place.channel)}: {100 * place.share:.0f} % over orders")
+
+
+def _ringing(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, *, after: bool) -> None:
+    """Amplitude density over frequency (Welch's method), its highest peak labelled."""
+    from scipy.signal import welch
+
+    index = next(k for k, s in enumerate(bench.series) if s.channel == place.channel)
+    series = bench.series[index]
+    record = bench.predictors[series.record].record
+    rate = 1.0 / record.period_s
+    good = series.train | series.hold
+    densities = {}
+    for stage, residuals in rest.items():
+        values = np.where(good, residuals[index], 0.0)
+        length = min(len(values), max(256, int(SPECTRUM_S * rate)))
+        frequency, power = welch(values, rate, nperseg=length)
+        densities[stage] = np.sqrt(power[1:])
+    frequency = frequency[1:]
+    unit = _unit(place.channel, float(densities["refit"].max()))
+    axes.loglog(
+        frequency, unit.factor * densities["refit"], color=BEFORE, label="left by the re-fitted model"
+    )
+    if after:
+        axes.loglog(frequency, unit.factor * densities["after"], color=AFTER, label="left after")
+    k = int(np.argmax(densities["refit"] * np.sqrt(frequency)))
+    axes.annotate(f"{frequency[k]:.3g} Hz", (frequency[k], unit.factor * densities["refit"][k]), (0, 3),
+                  textcoords="offset points", ha="center", fontsize=8.5, fontweight="bold")  # fmt: skip
+    axes.set_xlabel("frequency (Hz)")
+    axes.set_ylabel(f"amplitude density ({unit.name}/√Hz)")
+    axes.set_title(f"{spoken(place.channel)}: {100 * place.share:.0f} % over frequency")
 
 
 def _peaks(lines: Sequence[Line], span: float, bench: Bench) -> list[tuple[float, str]]:

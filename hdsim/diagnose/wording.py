@@ -175,7 +175,7 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
             f"{percent(share)} of what the model leaves, weighed by the noise, is that pattern; the named "
             "effects explain too little of it.",
         ]
-        return Sureness("Sure that something is missing, not what", f"chance {below(chance)}", tuple(said))
+        return Sureness("Sure that something is missing, not what", f"{below(chance)} by chance", tuple(said))
     if last <= LEVEL:
         nothing_more = (
             f"An effect of the catalogue explains more than chance does ({below(last)}), but too little, or "
@@ -183,8 +183,8 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
         )
     else:
         nothing_more = (
-            "Nothing more is seen: where nothing is missing, some effect of the catalogue looks as good by "
-            f"chance in {percent(last)} of cases (one is named only below {percent(LEVEL)})."
+            "Where nothing is missing, some effect of the catalogue looks as good as the best one here in "
+            f"{percent(last)} of cases (one is named only below {percent(LEVEL)})."
             if search and search[-1].ranked
             else "No effect of the catalogue could be tried on these data."
         )
@@ -195,11 +195,9 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
         return Sureness(_word(_FAR, far), number, tuple(said))
     ratios = [gap.after / gap.noise for gap in verdict.gap.values() if gap.noise > 0]
     worst = max(ratios, default=math.nan)
-    said = [nothing_more]
-    if ratios:
-        said.append(f"What is left is at most {worst:.2g} times the noise of its channel.")
     words = "No sign of anything missing" if last > LEVEL else "Nothing that can be named"
-    return Sureness(words, f"{percent(last)} by chance", tuple(said))
+    number = f"{worst:.2g} times the noise is left" if ratios else f"{percent(last)} by chance"
+    return Sureness(words, number, (nothing_more,))
 
 
 def _of_effects(effects: Sequence[NamedEffect]) -> Sureness:

@@ -13,7 +13,9 @@ from rich.console import Console
 
 import hdsim
 from hdsim.diagnose.figures import worst_stretch
+from hdsim.diagnose.figures_where import LABELS, located_figure
 from hdsim.diagnose.further import Candidate, CurveFound, NextExperiment
+from hdsim.diagnose.locate import Place
 from hdsim.diagnose.report import write_report
 from hdsim.diagnose.terminal import Progress, show
 from hdsim.diagnose.verdict import DataProblem, FittedNumber, NamedEffect
@@ -280,3 +282,38 @@ def test_the_bar_never_goes_back_and_is_silent_off_a_terminal(capsys):
             done.append(bar._done)
     assert done == sorted(done)
     assert done[-1] == 40
+
+
+def test_nothing_is_said_with_what_is_left(found, tmp_path):
+    gap = {
+        name: one.model_copy(update={"after": 1.25 * one.noise}) for name, one in found.verdict.gap.items()
+    }
+    text = page(found, tmp_path, verdict="nothing", effects=[], gap=gap, sentence="Nothing is lacking.")
+    assert "Nothing is lacking." in text
+    assert "1.2 times the noise is left" in text
+    assert "may still be there" in text
+
+
+def labels(figure) -> list[str]:
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_the_spectrum_names_its_peak_and_what_these_turns_cannot_tell_from_it(found):
+    figure = located_figure(found)
+    assert any(axes.get_xlabel() == "order: periods per wave-generator turn" for axes in figure.axes)
+    # The flexspline has 200 teeth, the circular spline 202: 4 turns of one are 4.04 against the other.
+    assert any(re.fullmatch(r"4(/4\.04)?", label) for label in labels(figure))
+
+
+@pytest.mark.parametrize("coordinate", list(LABELS))
+def test_every_coordinate_has_a_picture(found, coordinate):
+    if coordinate in ("torque", "temperature"):
+        pytest.skip("the bench has no such channel")
+    places = [Place(coordinate, "motor_torque", 0.5), Place("direction", "motor_torque", 0.1)]
+    location = replace(found.stages[0].location, places=places)
+    figure = located_figure(replace(found, stages=[replace(found.stages[0], location=location)]))
+    assert len(figure.axes) == 2
+    assert figure.axes[1].get_title(loc="left").startswith("motor torque: 50 %")
+    assert figure.axes[1].lines
+    assert figure.axes[1].get_xlabel()
+    figure.draw_without_rendering()
