@@ -33,6 +33,7 @@ from hdsim.diagnose.further import Candidate, NextExperiment
 from hdsim.diagnose.measured import CHANNELS, Array
 from hdsim.diagnose.predict import LEAD_IN_S
 from hdsim.errors import InputError
+from hdsim.plot import units
 
 #: Rate at which experiments are simulated, Hz; the noise counts at the rate of the data.
 RATE_HZ = 200.0
@@ -104,10 +105,13 @@ def propose(
         )
         for o in ranked
     ]
+    unit = units.Unit(CHANNELS[chosen.channel], 1.0)
+    if unit.name == "rad":
+        unit = units.for_error(chosen.difference)
     sentence = (
-        f"To tell {apart} apart: {chosen.experiment.title}. Expected d' {chosen.separation:.2g}{hardest} "
-        f"({again:.2g} from repeating the record). Look at {channel}: they say up to "
-        f"{chosen.difference:.2g} {CHANNELS[chosen.channel]} apart, at {chosen.at_s:.2g} s."
+        f"To tell {apart} apart: {chosen.experiment.title}. Expected d' {_said(chosen.separation)}{hardest} "
+        f"({_said(again)} from repeating the record). Look at {channel}: they say up to "
+        f"{unit.factor * chosen.difference:.2g} {unit.name} apart, at {chosen.at_s:.2g} s."
     )
     proposal = NextExperiment(
         sentence=sentence,
@@ -340,6 +344,10 @@ def _separated(
             best = (channel, float(abs(part[k]) / weight), k)
         at += n
     return math.sqrt(max(squared, 0.0)), best[0], best[1], float(best[2])
+
+
+def _said(separation: float) -> str:
+    return f"{separation:.0f}" if separation >= 9.95 else f"{separation:.2g}"
 
 
 def _short(value: float) -> float:

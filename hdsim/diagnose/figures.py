@@ -41,7 +41,7 @@ def gap_bars(diagnosis: Diagnosis) -> dict[str, Bars]:
     bench, verdict = diagnosis.bench, diagnosis.verdict
     last = "with the curve" if verdict.curve is not None else "with the effect"
     # Where nothing is added, the re-fitted model is what comes out.
-    own = REFIT if verdict.verdict == "effect" or verdict.curve is not None else AFTER
+    own = REFIT if verdict.verdict in ("effect", "unknown") else AFTER
     found: dict[str, Bars] = {}
     for channel, gap in verdict.gap.items():
         found[channel] = [

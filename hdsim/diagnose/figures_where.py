@@ -100,6 +100,9 @@ def _panels(shown: Sequence[Place]) -> list[Place]:
     for place in telling:
         if place.coordinate not in {other.coordinate for other in chosen}:
             chosen.append(place)
+    # Two would leave a hole in the page.
+    rest = [p for p in shown if p not in chosen and p.coordinate in LABELS and p.coordinate != "direction"]
+    chosen += rest[:1] if len(chosen) == 2 else []
     return sorted(chosen[:MOST_PANELS], key=lambda place: -place.share)
 
 
@@ -148,15 +151,14 @@ def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, 
     axes.plot(
         x[::thin], unit.factor * values["refit"][::thin], ".", markersize=2, color="#9A9A9A", alpha=0.45
     )
-    timed = place.coordinate == "time"
     turned = where["direction"][used]
     if place.coordinate in _LOOPS and len(np.unique(turned)) > 1:
         _mean(axes, x[turned > 0], unit.factor * values["refit"][turned > 0], BEFORE, "left, forwards", "-")
         _mean(axes, x[turned < 0], unit.factor * values["refit"][turned < 0], BEFORE, "left, backwards", "--")
     else:
-        _mean(axes, x, unit.factor * values["refit"], BEFORE, "left by the re-fitted model", gaps=timed)
+        _mean(axes, x, unit.factor * values["refit"], BEFORE, "left by the re-fitted model")
     if after:
-        _mean(axes, x, unit.factor * values["after"], AFTER, "left after", gaps=timed)
+        _mean(axes, x, unit.factor * values["after"], AFTER, "left after")
     axes.set_ylim(*_limits(unit.factor * low, unit.factor * high))
     axes.set_xlabel(f"{label} ({name})" if name else label)
     axes.set_ylabel(f"measured less model ({unit.name})")
@@ -171,10 +173,8 @@ def _limits(low: float, high: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _mean(
-    axes: Axes, x: Array, values: Array, colour: str, label: str, line: str = "-", *, gaps: bool = False
-) -> None:
-    """Draw the mean of ``values`` over bins of equally many samples; with ``gaps`` not across holes."""
+def _mean(axes: Axes, x: Array, values: Array, colour: str, label: str, line: str = "-") -> None:
+    """Draw the mean of ``values`` over bins of ``x`` that hold equally many samples; not across holes."""
     edges = np.unique(np.quantile(x, np.linspace(0, 1, 41))) if len(x) > 80 else np.zeros(0)
     if len(edges) < 4:
         kinds = np.unique(x)
@@ -185,9 +185,8 @@ def _mean(
     inside = np.clip(np.searchsorted(edges, x) - 1, 0, len(edges) - 2)
     count = np.maximum(np.bincount(inside, minlength=len(edges) - 1), 1)
     at, mean = (np.bincount(inside, v, len(edges) - 1) / count for v in (x, values))
-    if gaps:
-        hole = 1 + np.flatnonzero(np.diff(at) > 6.0 * np.median(np.diff(at)))
-        at, mean = np.insert(at, hole, np.nan), np.insert(mean, hole, np.nan)
+    hole = 1 + np.flatnonzero(np.diff(at) > max(6.0 * float(np.median(np.diff(at))), 0.1 * float(np.ptp(x))))
+    at, mean = np.insert(at, hole, np.nan), np.insert(mean, hole, np.nan)
     axes.plot(at, mean, line, color=colour, linewidth=1.8, label=label)
 
 

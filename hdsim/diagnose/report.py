@@ -16,9 +16,9 @@ from hdsim.diagnose.tables import GAP_HEAD, gap_rows, numbers_table, table
 from hdsim.diagnose.verdict import Verdict
 from hdsim.diagnose.wording import (
     KINDS,
-    MEANINGS,
     gains,
     headline,
+    meaning,
     percent,
     shown,
     spoken,
@@ -158,8 +158,8 @@ def _head(diagnosis: Diagnosis) -> str:
         f"class='number'>{html.escape(sure.number)}</span></p>"
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)
         + f"</div><div><h2>What it "
-        f"means</h2><p>{html.escape(MEANINGS[verdict.verdict])}</p>{_pointers(verdict)}</div><div><h2>What "
-        f"it gains</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
+        f"means</h2><p>{html.escape(meaning(verdict))}</p>{_pointers(verdict)}</div><div><h2>What it "
+        f"gains</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
     )
 
 
@@ -199,7 +199,7 @@ def _next(verdict: Verdict) -> str:
     if proposal is None:
         return ""
     rows = [
-        [c.title, f"{c.separation:.2g}", f"{c.relative:.2g} ×" if c.relative else "-"]
+        [c.title, _short(c.separation), f"{_short(c.relative)} ×" if c.relative else "-"]
         for c in proposal.considered[:8]
     ]
     body = f"<p><b>{html.escape(proposal.sentence)}</b></p>"
@@ -211,12 +211,16 @@ def _next(verdict: Verdict) -> str:
     body += (
         "<p class='note'>d′ is the distance between the two candidates that are hardest to tell apart, in "
         "standard deviations of the noise, after each has been fitted to the other as well as it can be: 1 "
-        f"is a guess that is right in 69 % of cases, 3 in 93 %, more is safe. Here {proposal.separation:.2g} "
-        f"is expected, which is right in {percent(proposal.correct)} of cases if the noise is all that is "
-        "unknown.</p>"
+        "is a guess that is right in 69 % of cases, 3 in 93 %, more is safe. Here "
+        f"{_short(proposal.separation)} is expected, which is right in {percent(proposal.correct)} of cases "
+        "if the noise is all that is unknown.</p>"
     )
     head = ("experiment", "expected d′", "against repeating the record")
     return f"<section id='next'><h2>What to measure next</h2>{body}{table(head, rows, (1, 2))}</section>"
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
 
 
 def _curve(verdict: Verdict, pictures: dict[str, str]) -> str:

@@ -27,8 +27,8 @@ MEANINGS = {
     "fitted numbers below, no further effect is seen.",
     "effect": "A known physical effect that the model does not have explains what no change of the model's "
     "own numbers can. It is added, with fitted numbers, in found.yaml.",
-    "unknown": "A pattern is left that repeats, and no known effect explains it well enough to be named. "
-    "Better no name than a wrong one: it is given as a curve instead.",
+    "unknown": "A pattern is left that repeats, and no known effect explains it well enough to be named: "
+    "better no name than a wrong one.",
 }
 #: Words for the share of resampled records in which the same name wins, from the highest down.
 _SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sure"))
@@ -70,6 +70,18 @@ class Sureness:
     words: str
     number: str
     details: tuple[str, ...]
+
+
+def meaning(verdict: Verdict) -> str:
+    """What a verdict means for the reader's model."""
+    said = MEANINGS[verdict.verdict]
+    if verdict.verdict == "unknown":
+        said += (
+            " Instead it is given as a curve, which found.yaml adds to the model."
+            if verdict.curve is not None
+            else " No curve over a single quantity holds on unseen data; the pictures show where it is."
+        )
+    return said
 
 
 def spoken(name: str) -> str:
@@ -125,13 +137,17 @@ def unit_of(gap: Gap) -> units.Unit:
     return units.for_torque(gap.before) if gap.unit == "N m" else units.Unit(gap.unit, 1.0)
 
 
-def titles_of(effect: NamedEffect) -> list[str]:
-    """The effect's title, and the titles of those that it cannot be told from."""
+def title_of(name: str) -> str:
+    """The field's term for an effect of the catalogue."""
     from hdsim.effects import catalogue
 
     known = catalogue()
-    others = (known[name].title if name in known else spoken(name) for name in effect.indistinguishable_from)
-    return [effect.title or spoken(effect.name), *others]
+    return known[name].title if name in known else spoken(name)
+
+
+def titles_of(effect: NamedEffect) -> list[str]:
+    """The effect's title, and the titles of those that it cannot be told from."""
+    return [effect.title or spoken(effect.name), *map(title_of, effect.indistinguishable_from)]
 
 
 def headline(verdict: Verdict) -> str:
@@ -148,7 +164,9 @@ def headline(verdict: Verdict) -> str:
         said = said.replace("1 numbers of the model are", "one number of the model is")
         said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."
     else:
-        return sentence
+        for channel in verdict.gap:
+            sentence = sentence.replace(channel, spoken(channel))
+        return sentence.replace("is a function of frequency", "is vibration that the motion shakes up")
     # What is to be checked first stays first.
     doubt = sentence.partition("Check the data first: ")[2]
     return f"Check the data first (below). {said}" if doubt else said

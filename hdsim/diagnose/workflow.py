@@ -267,6 +267,7 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
         InputError: ``out`` cannot be written.
     """
     from hdsim.diagnose.add import scenario_text
+    from hdsim.diagnose.following import next_experiment
     from hdsim.diagnose.record_out import write_compared
     from hdsim.diagnose.report import write_report
 
@@ -274,12 +275,16 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
     verdict = diagnosis.verdict
     with staged(out) as stage:
         # What an earlier diagnosis found must not stay beside this one's verdict.
-        (out / "found.yaml").unlink(missing_ok=True)
+        for name in ("found.yaml", "next.yaml", "curve.png"):
+            (out / name).unlink(missing_ok=True)
         if verdict.verdict in ("effect", "parameter") or verdict.curve is not None:
             state, freedoms = diagnosis.final.state, diagnosis.refit.freedoms
             text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
             (stage / "found.yaml").write_text(text, encoding="utf-8")
             verdict.scenario = str(out / "found.yaml")
+        experiment = next_experiment(diagnosis, Path(base), out)
+        if experiment is not None:
+            (stage / "next.yaml").write_text(experiment, encoding="utf-8")
         write_compared(diagnosis, stage)
         (stage / "verdict.json").write_text(verdict.model_dump_json(indent=2), encoding="utf-8")
         report = write_report(diagnosis, stage)

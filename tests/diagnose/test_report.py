@@ -14,11 +14,12 @@ from rich.console import Console
 import hdsim
 from hdsim.diagnose.figures import worst_stretch
 from hdsim.diagnose.figures_where import LABELS, located_figure
+from hdsim.diagnose.following import NOTHING, candidates
 from hdsim.diagnose.further import Candidate, CurveFound, NextExperiment
 from hdsim.diagnose.locate import Place
 from hdsim.diagnose.report import write_report
 from hdsim.diagnose.terminal import Progress, show
-from hdsim.diagnose.verdict import DataProblem, FittedNumber, NamedEffect
+from hdsim.diagnose.verdict import DataProblem, FittedNumber, NamedEffect, Verdict
 from hdsim.diagnose.wording import farthest, headline, named_number, shown, sureness, unit_of
 from hdsim.diagnose.workflow import Diagnosis, diagnose, save
 from hdsim.log import read_attachments
@@ -317,3 +318,28 @@ def test_every_coordinate_has_a_picture(found, coordinate):
     assert figure.axes[1].lines
     assert figure.axes[1].get_xlabel()
     figure.draw_without_rendering()
+
+
+def test_a_group_gets_its_next_experiment_as_a_scenario_that_runs(found, base, tmp_path):
+    own = replace(
+        found.named[0], group={"stribeck_friction": 0.99}, alternatives={"stribeck_friction": found.refit.fit}
+    )
+    effect = found.verdict.effects[0].model_copy(update={"indistinguishable_from": ["stribeck_friction"]})
+    verdict = found.verdict.model_copy(update={"effects": [effect]})
+    report = save(replace(found, named=[own], verdict=verdict), base, tmp_path).read_text(encoding="utf-8")
+    kept = Verdict.model_validate_json((tmp_path / "verdict.json").read_text(encoding="utf-8"))
+    proposal = kept.next_experiment
+    assert proposal.between == ["motor_torque_ripple", "stribeck_friction"]
+    assert proposal.scenario == str(tmp_path / "next.yaml")
+    assert html.escape(proposal.sentence) in report
+    assert hdsim.load_scenario(proposal.scenario).run.duration_s > 0
+    assert proposal.considered[0].separation == max(c.separation for c in proposal.considered)
+
+
+def test_only_what_the_data_leave_open_is_to_be_measured_again(found):
+    own = found.named[0]
+    assert candidates(found) == {}
+    weak = replace(own, confidence=0.6)
+    assert candidates(replace(found, named=[weak])) == {own.name: own.fit, NOTHING: found.refit.fit}
+    silent = found.verdict.model_copy(update={"verdict": "nothing"})
+    assert candidates(replace(found, named=[weak], verdict=silent)) == {}

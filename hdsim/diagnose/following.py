@@ -1,0 +1,67 @@
+"""What to measure next: the candidates that a diagnosis leaves open, and what tells them apart."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hdsim.diagnose.experiment import propose
+from hdsim.diagnose.wording import title_of
+from hdsim.errors import InputError
+
+if TYPE_CHECKING:
+    from hdsim.diagnose.fit import Fit
+    from hdsim.diagnose.workflow import Diagnosis
+
+#: Share of resampled records below which a name is weak: then it is held against the model without it.
+WEAK = 0.8
+#: What the model without an effect is called in a sentence.
+NOTHING = "nothing more"
+
+
+def candidates(diagnosis: Diagnosis) -> dict[str, Fit]:
+    """Fitted models that these data leave open, the best first; empty when they leave nothing open.
+
+    A group of effects that cannot be told apart comes before a weak name. All fits are those made when the
+    effect was named, so that they know the same other effects.
+    """
+    if diagnosis.verdict.verdict != "effect":
+        return {}
+    for one in diagnosis.named:
+        others = {name: one.alternatives[name] for name in one.group if name in one.alternatives}
+        if others:
+            return {one.name: one.fit, **others}
+    last = diagnosis.named[-1]
+    if last.confidence < WEAK and len(diagnosis.named) == 1:
+        return {last.name: last.fit, NOTHING: diagnosis.refit.fit}
+    return {}
+
+
+def next_experiment(diagnosis: Diagnosis, base: Path, out: Path, name: str = "next.yaml") -> str | None:
+    """Set the verdict's ``next_experiment``, where something is left open.
+
+    Args:
+        diagnosis: what was found.
+        base: file of the base scenario.
+        out: directory in which the experiment's scenario will stand.
+        name: its file name.
+
+    Returns:
+        The YAML text of the experiment's scenario.
+    """
+    found = candidates(diagnosis)
+    if len(found) < 2:
+        return None
+    started = time.perf_counter()
+    titles = {key: key if key == NOTHING else title_of(key) for key in found}
+    try:
+        proposal, text = propose(
+            diagnosis.bench, found, base=base.resolve(), beside=out.resolve(), titles=titles
+        )
+    except InputError:
+        return None  # no experiment could be simulated: that is no reason to lose the verdict
+    proposal.scenario = str(out / name)
+    diagnosis.verdict.next_experiment = proposal
+    diagnosis.verdict.seconds["next"] = round(time.perf_counter() - started, 3)
+    return text
