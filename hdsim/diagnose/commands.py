@@ -60,7 +60,7 @@ def diagnose(
     )
     with Progress() as tell:
         found = run(records, scenario, holdout=held, load=load, force=force, on_step=tell)
-        tell("writing the report")
+        tell("finding the next experiment, writing the report")
         report = save(found, model, out)
     show(found)
     click.echo(f"report   {report}")

@@ -26,7 +26,7 @@ STEPS = {
     "asking each name again": 70,
     "fitting the curve": 75,
     "proving": 90,
-    "writing the report": 95,
+    "finding the next experiment": 95,
 }
 #: Narrow enough for 80 columns; ``left`` is the gap after over the one before.
 _HEAD = ("channel", "before", "re-fit", "after", "noise", "left", "x noise")
