@@ -1,32 +1,24 @@
-"""Step 5, name: which effect of the catalogue leaves the trace that is left.
+"""Step 5b, name: the best of the screen are fitted in the simulated model, and the best of them has the name.
 
-Screen: every effect is simulated at its unit size in the re-fitted model; the change of all channels
-together is its trace, and the cross-validated share of the residual that the traces explain ranks it. Fit:
-the best few are then fitted in the simulated model, with the base's own numbers free, and compared on
-blocks that the comparison has not used.
+The base's own numbers stay free in these fits; candidates are compared block of time by block of time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import product
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.fit import Fit, fit
-from hdsim.diagnose.freedom import Added, Free, State, number_at, signed
-from hdsim.diagnose.locate import Line
+from hdsim.diagnose.freedom import Added, Free
 from hdsim.diagnose.measured import Array
-from hdsim.diagnose.predict import CARRIED, PredictionError
-from hdsim.diagnose.screen import Residual, Share, chance_of
+from hdsim.diagnose.predict import PredictionError
+from hdsim.diagnose.screen import Residual
+from hdsim.diagnose.traces import Screened, Screening
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Amplitude, Fitting, Inverse, Periodic
 
-#: Orders of a periodic term that are taken from the spectra.
-MOST_ORDERS = 3
 #: Largest chance at which a search may name an effect.
 LEVEL = 0.02
 #: Least share of the weighed residual that an effect must explain to be worth a name.
@@ -39,37 +31,10 @@ ALIKE = 0.5
 FAR = 0.7
 #: Part of its share that another effect must keep beside the best to be an effect of its own.
 BESIDE = 0.6
-#: Factor within which a trace's size must fit the residual's; else its unit is changed.
-FITTING = 4.0
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
 SAME = 0.02
 #: The same for effects that are known to look alike, when neither reaches the noise.
 MISMATCH = 0.1
-
-
-@dataclass
-class Screened:
-    """An effect on the screen: the fitting of it that explains most, and its trace, shape (rows, k)."""
-
-    name: str
-    added: Added
-    share: Share
-    columns: Array
-
-
-@dataclass
-class Screening:
-    """The whole catalogue on the screen.
-
-    Attributes:
-        ranked: by falling share, one entry an effect.
-        chance: probability that the search finds the best share where nothing is missing.
-        skipped: effects that could not be tried, with the reason.
-    """
-
-    ranked: list[Screened] = field(default_factory=list)
-    chance: float = 1.0
-    skipped: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass
@@ -95,218 +60,6 @@ class Named:
     share: float
     chance: float
     alternatives: dict[str, Fit]
-
-
-def screen(
-    bench: Bench,
-    state: State,
-    predictions: Sequence[Array],
-    residual: Residual,
-    lines: Sequence[Line],
-    *,
-    on_step: Callable[[str], object] | None = None,
-) -> Screening:
-    """Rank every effect of the catalogue by the share of the residual that its trace explains.
-
-    Args:
-        bench: the measured series.
-        state: the re-fitted model.
-        predictions: its predictions.
-        residual: what it leaves.
-        lines: peaks of the order spectra.
-        on_step: told what is being tried.
-    """
-    found = Screening()
-    shares: list[Share] = []
-    present = set(state.effects) | {added.effect for added in state.added}
-    tried: list[Added] = []
-    ranges = bench.ranges()
-    for name, kind in catalogue().items():
-        fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
-        if name in present and name != "sensors":
-            found.skipped[name] = "the model has it"
-            continue
-        if not fittings:
-            continue  # it stands for what has no name
-        for fitting in fittings:
-            if any(channel not in bench.channels for channel in fitting.needs):
-                continue
-            if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):
-                found.skipped[name] = f"the model has {' and '.join(fitting.covered_by)}"
-                continue
-            if bench.turns < fitting.turns:
-                found.skipped[name] = f"the wave generator makes {bench.turns:.2g} turns only"
-                continue
-            if (name, fitting.label) in {(added.effect, added.fitting.label) for added in state.added}:
-                continue
-            if behind_sensor(bench, state, name, fitting):
-                found.skipped[name] = (
-                    "acts on the load's side of the torque sensor, whose reading is the load"
-                )
-                continue
-            tried += starts(name, fitting, lines, ranges)
-    if on_step is not None:
-        on_step(f"{len(tried)} traces")
-    best: dict[str, Screened] = {}
-    wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
-    for added, columns in traces(bench, state, predictions, tried, wanted):
-        if columns is None or not np.any(columns):
-            continue
-        share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
-        shares.append(share)
-        name = added.effect
-        if name not in best or share.share > best[name].share.share:
-            best[name] = Screened(
-                name, replace(added, coefficients=tuple(share.coefficients)), share, columns
-            )
-    for name in catalogue():
-        if name not in best:
-            found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
-    found.ranked += best.values()
-    found.ranked.sort(key=lambda one: -one.share.share)
-    if found.ranked:
-        found.chance = chance_of(found.ranked[0].share, shares)
-    return found
-
-
-def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[str, float]) -> list[Added]:
-    """The effect at unit size with every combination of its shapes' starts.
-
-    Args:
-        name: of the effect.
-        fitting: how it is fitted.
-        lines: peaks of the order spectra, for its periodic terms.
-        ranges: what the records cover, for units that are parts of it.
-
-    Returns:
-        Nothing when the record does not give what the fitting asks for.
-    """
-    if any(isinstance(t, Amplitude) and t.of_range and t.of_range not in ranges for t in fitting.terms):
-        return []
-    fitting = replace(fitting, terms=tuple(_sized(term, ranges) for term in fitting.terms))
-    orders: tuple[float, ...] = ()
-    for term in fitting.terms:
-        if isinstance(term, Periodic):
-            own = [line.order for line in lines if line.channel == term.channel and line.order >= 1.0]
-            own = [order for order in own if not any(abs(order - o) < 0.05 for o in term.besides)]
-            orders = tuple(own[:MOST_ORDERS])
-            if not orders and not term.besides:
-                return []
-    count = len(signed(fitting, len(orders)))
-    return [
-        Added(name, fitting, (1.0,) * count, tuple(shapes), orders)
-        for shapes in product(*(shape.starts for shape in fitting.shapes))
-    ]
-
-
-def _sized(term: Any, ranges: Mapping[str, float]) -> Any:
-    if not isinstance(term, Amplitude) or not term.of_range:
-        return term
-    return replace(_scaled(term, ranges[term.of_range]), of_range="")
-
-
-def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bool:
-    """Whether an effect acts on the output, in records whose load is what the output's torque sensor reads.
-
-    Such an effect changes the torque that the sensor has measured already, so it cannot be missing there.
-    """
-    first = bench.predictors[0]
-    if first.plan.load != "output_torque":
-        return False
-    for added in starts(name, fitting, (), {})[:1]:
-        try:
-            without = first.predict(state.candidate())
-            tried = replace(state, added=(*state.added, added))
-            there = first.predict(tried.candidate())
-        except PredictionError:
-            return True
-        torque = float(np.std(there[CARRIED] - without[CARRIED])) / abs(first.ratio)
-        motor = float(np.std(there.get("motor_torque", np.zeros(1)) - without.get("motor_torque", 0.0)))
-        return torque > 0.5 * motor and torque > 0.0
-    return False
-
-
-def traces(
-    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added], wanted: float
-) -> list[tuple[Added, Array | None]]:
-    """Change of the whitened predictions for each coefficient at 1 alone, shape (rows, k).
-
-    Args:
-        bench: the measured series.
-        state: the model without the effects.
-        predictions: its predictions.
-        tried: the effects; each is simulated apart.
-        wanted: root-mean-square that a trace should have; units that are far too small or large for this
-            drive are changed, and the trace is simulated again.
-
-    Returns:
-        Every effect in the units that were used, with its design, None where it could not be predicted.
-    """
-    found = list(zip(tried, _designs(bench, state, predictions, tried), strict=True))
-    again: dict[int, Added] = {}
-    for k, (added, columns) in enumerate(found):
-        if columns is None or added.fitting.cumulative:
-            continue
-        size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
-        if size > 0 and not wanted / FITTING < size < wanted * FITTING:
-            factor = float(np.clip(wanted / size, 1e-3, 1e5))
-            terms = tuple(_scaled(term, factor) for term in added.fitting.terms)
-            again[k] = replace(added, fitting=replace(added.fitting, terms=terms))
-    for (k, added), columns in zip(
-        again.items(), _designs(bench, state, predictions, list(again.values())), strict=True
-    ):
-        if columns is not None:
-            found[k] = (added, columns)
-    return found
-
-
-def _designs(
-    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added]
-) -> list[Array | None]:
-    states = []
-    for added in tried:
-        count = len(added.coefficients)
-        below = 1.0 if added.fitting.cumulative else 0.0
-        for k in range(count):
-            unit = tuple(1.0 if j == k else below if j < k else 0.0 for j in range(count))
-            states.append(replace(state, added=(*state.added, replace(added, coefficients=unit))))
-    there = iter(bench.predict_all(states))
-    found: list[Array | None] = []
-    for added in tried:
-        own = [next(there) for _ in added.coefficients]
-        columns: list[Array] = []
-        before: Sequence[Array] = predictions
-        for one in own:
-            if one is None:
-                break
-            columns.append(bench.trace(before, one))
-            if added.fitting.cumulative:
-                before = one
-        found.append(np.column_stack(columns) if len(columns) == len(own) else None)
-    return found
-
-
-def _scaled(term: Any, factor: float) -> Any:
-    """A term whose unit is worth ``factor`` times as much."""
-    if isinstance(term, Amplitude):
-        return replace(term, units={path: unit * factor for path, unit in term.units.items()})
-    return replace(term, unit=term.unit / factor if isinstance(term, Inverse) else term.unit * factor)
-
-
-def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:
-    """The share with coefficients of the allowed sign: a wrong one is left out."""
-    use = [True] * columns.shape[1]
-    while True:
-        kept = np.array(use)
-        share = residual.share(columns * kept)
-        wrong = [k for k, c in enumerate(share.coefficients) if use[k] and c < 0 and not free[k]]
-        if not wrong:
-            return share
-        for k in wrong:
-            use[k] = False
-        if not any(use):
-            powers = residual.powers
-            return Share(0.0, powers, np.zeros(columns.shape[1]), share.chance)
 
 
 def name_effect(

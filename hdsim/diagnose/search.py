@@ -22,17 +22,16 @@ from hdsim.diagnose.name import (
     LEVEL,
     SAME,
     Named,
-    Screening,
     at_present,
     block_losses,
     channel_powers,
     confusable,
     name_effect,
-    screen,
 )
 from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.refit import align, reweigh
 from hdsim.diagnose.screen import Residual
+from hdsim.diagnose.traces import Screening, screen
 
 #: Most effects that one diagnosis adds.
 MOST_EFFECTS = 4
