@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
 from hdsim.effects import catalogue
+from hdsim.effects._fitting import Inverse
 
 #: Largest chance at which a search may name an effect.
 LEVEL = 0.02
@@ -25,10 +27,13 @@ LEVEL = 0.02
 LEAST_SHARE = 0.03
 #: Candidates that are fitted in full, and the part of the best share that they must reach on the screen.
 SHORTLIST, NEAR = 5, 0.75
-#: The same part for effects that are known to look like the best: the screen is linear, they are not.
+#: The same part for effects that are known to look like the best, or that live in the coordinate that
+#: explains most: the screen is linear, they are not.
 ALIKE = 0.5
 #: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
 FAR = 0.7
+#: Part of the screen's coefficient at which a compliance's fit begins a second time.
+SMALL = 0.2
 #: Part of its share that another effect must keep beside the best to be an effect of its own.
 BESIDE = 0.6
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
@@ -68,6 +73,7 @@ def name_effect(
     screening: Screening,
     residual: Residual,
     *,
+    coordinate: str = "",
     on_step: Callable[[str], object] | None = None,
 ) -> Named | None:
     """Fit the screen's best in the simulated model and keep the best of them.
@@ -77,14 +83,18 @@ def name_effect(
         base: the fitted model without the effect.
         screening: the catalogue on the screen.
         residual: what it was screened on.
+        coordinate: the one that explains most of it; effects that live there are fitted more readily.
         on_step: told what is being fitted.
     """
     best = screening.ranked[0]
-    shortlist = [
-        one
-        for one in screening.ranked
-        if one.share.share >= (ALIKE if confusable(best.name, one.name) else NEAR) * best.share.share
-    ][:SHORTLIST]
+    known = catalogue()
+
+    def near(name: str) -> float:
+        lives = coordinate in known[name].signature.lives_in[:1]
+        return ALIKE if lives or confusable(best.name, name) else NEAR
+
+    shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
+    shortlist = shortlist[:SHORTLIST]
     before = block_losses(bench, base.predictions)
     results: list[tuple[str, Fit, Array]] = []
     for one in shortlist:
@@ -137,8 +147,13 @@ def _fitted(bench: Bench, base: Fit, added: Added) -> Fit | None:
     if any(abs(t) > FAR for t in base.theta):
         begins.append({free.name: -float(t) for free, t in zip(base.frees, base.theta, strict=True)})
     evaluations = 6 + 4 * bool(added.shapes) + 6 * (len(begins) > 1)
+    states = [state]
+    if any(isinstance(term, Inverse) for term in added.fitting.terms):
+        # Compliances that stiffen are far from linear in their coefficient: a small one is a start too.
+        small = replace(added, coefficients=tuple(SMALL * c for c in added.coefficients))
+        states.append(replace(base.state, added=(*base.state.added, small)))
     found: list[Fit] = []
-    for theta in begins:
+    for state, theta in product(states, begins):
         try:
             found.append(
                 fit(bench, state, frees, held_effects=len(base.state.added), prune=False,

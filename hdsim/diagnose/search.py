@@ -90,7 +90,11 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         if not found.named and ranked[0].share.share < LEAST_SHARE:
             break
         tell = during("fit", "fitting the shortlist")
-        named = name_effect(bench, current, stage.screening, found.left, on_step=tell)
+        places = stage.location.places
+        named = name_effect(
+            bench, current, stage.screening, found.left,
+            coordinate=places[0].coordinate if places else "", on_step=tell,
+        )  # fmt: skip
         if named is None or not _matters(bench, base, current, named, found.named):
             break
         stage.named = named
