@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
-from test_real_data import KINOVA, RIGID, ROOT
+from test_real_data import KINOVA, ROOT
 
 import hdsim
 from hdsim.diagnose import workflow
@@ -131,8 +131,8 @@ def test_a_motion_that_no_model_follows_is_told(tmp_path):
 
 @pytest.mark.skipif(not KINOVA.exists(), reason="the recordings are not here")
 @pytest.mark.parametrize("joint", [1, 6])
-def test_a_real_joint_under_a_base_that_lacks_friction_is_not_suspected(tmp_path, joint):
-    (tmp_path / "rigid.yaml").write_text(RIGID, encoding="utf-8")
+def test_a_real_joint_under_a_base_that_lacks_friction_is_not_suspected(joint):
+    base = ROOT / "scenarios" / "bases" / "kinova_rigid.yaml"
     mapping = ROOT / "scenarios" / "mappings" / f"kinova_joint_{joint}.yaml"
     record = record_from(hdsim.import_recording(KINOVA, mapping), f"joint {joint}")
-    assert suspected([record], hdsim.load_scenario(tmp_path / "rigid.yaml"), load="output_torque") == []
+    assert suspected([record], hdsim.load_scenario(base), load="output_torque") == []
