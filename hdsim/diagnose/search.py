@@ -33,8 +33,8 @@ from hdsim.diagnose.refit import align, reweigh
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screening, screen
 
-#: Most effects that one diagnosis adds.
-MOST_EFFECTS = 4
+#: Most effects that one diagnosis adds, and most passes that it makes.
+MOST_EFFECTS, MOST_STAGES = 4, 7
 #: Part of a channel's first residual that a later effect must explain; more where it can look like what an
 #: effect that is there already leaves, because the true formula is never quite the catalogue's.
 LATER_SHARE, LATER_ALIKE = 0.02, 0.1
@@ -78,7 +78,8 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         found.left = left_of(bench, current)
         stage = Stage(title, locate(bench, found.left, bench.residuals(current.predictions)))
         found.stages.append(stage)
-        if len(found.named) == MOST_EFFECTS:
+        # Names that take each other's place would go on for ever.
+        if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
             break
         tell = during("screen", "screening the catalogue")
         stage.screening = screen(
