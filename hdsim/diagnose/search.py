@@ -32,6 +32,7 @@ from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.refit import align, reweigh
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screening, screen
+from hdsim.effects import catalogue
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7
@@ -114,10 +115,19 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
 
 def _matters(bench: Bench, base: Fit, before: Fit, new: Named, others: list[Named]) -> bool:
     """Whether an effect explains enough beside what was there first, in one channel at least."""
-    alike = any(confusable(new.name, other.name) or new.name in other.group for other in others)
+    alike = any(
+        (confusable(new.name, other.name) and _channel(new.name) == _channel(other.name))
+        or new.name in other.group
+        for other in others
+    )
     least = LATER_ALIKE if alike else LATER_SHARE
     first, last, now = (channel_powers(bench, each.predictions) for each in (base, before, new.fit))
     return not others or max(last[c] - now[c] - least * first[c] for c in first) >= 0
+
+
+def _channel(name: str) -> str:
+    """The channel in which an effect shows most."""
+    return catalogue()[name].signature.channels[0]
 
 
 def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
