@@ -109,11 +109,13 @@ class Bench:
         return tuple(dict.fromkeys(series.channel for series in self.series))
 
     @property
-    def noise_power(self) -> float:
-        """What the sensors' noise alone leaves of the whitened training residual's power."""
-        return sum(
-            float(s.train.sum()) * (s.noise / s.sigma) ** 2 for s in self.series if s.record < self.training
-        )
+    def noise_powers(self) -> dict[str, float]:
+        """What the sensors' noise alone leaves of each channel's whitened training residual, as power."""
+        found = dict.fromkeys(self.channels, 0.0)
+        for s in self.series:
+            if s.record < self.training:
+                found[s.channel] += float(s.train.sum()) * (s.noise / s.sigma) ** 2
+        return found
 
     @property
     def turns(self) -> float:
@@ -178,8 +180,28 @@ class Bench:
             differences.append(change - change[series.train].mean() if series.train.any() else change)
         return self.stacked(differences)
 
-    def ranges(self) -> dict[str, float]:
-        """Ranges that the training records cover: ``twist_arcmin`` (1 % quantiles) where they tell it."""
+    def ranges(self, state: State) -> dict[str, float]:
+        """What the training records cover, by the names that fittings use.
+
+        ``twist_arcmin`` (between 1 % quantiles) where they tell it; ``torque_nm`` and
+        ``motor_side_torque_nm``, the largest torque at the output, measured or as the motor's, else the one
+        where the drive's third stiffness begins.
+
+        Args:
+            state: the model.
+        """
+        found = self._twists()
+        largest = 0.0
+        for predictor in self.predictors[: self.training]:
+            for channel, factor in (("output_torque", 1.0), ("motor_torque", abs(predictor.ratio))):
+                if channel in predictor.record.channels and predictor.record.trusted[channel].any():
+                    values = np.abs(predictor.record.filled(channel))
+                    largest = max(largest, factor * float(np.quantile(values, 0.99)))
+                    break
+        largest = largest or state.drive.torsion.torque_t2_nm
+        return found | {"torque_nm": largest, "motor_side_torque_nm": largest / abs(self.predictors[0].ratio)}
+
+    def _twists(self) -> dict[str, float]:
         widest = 0.0
         for predictor in self.predictors[: self.training]:
             twist = predictor.motor_angle / predictor.ratio

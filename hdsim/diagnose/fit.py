@@ -1,6 +1,8 @@
 """Output-error fits: a model's numbers by non-linear least squares on the predicted channels, with intervals.
 
-The Jacobian is made of finite differences whose step is large against the solver's noise. Residuals of a
+The Jacobian is made of finite differences whose step is large against the solver's noise; between two of
+them it follows the residuals that the fit sees anyway (Broyden 1965, Mathematics of Computation 19:577), for
+as long as it foretells them. Residuals of a
 model are correlated in time, so the covariance is the cluster-robust one over blocks of time (Liang and
 Zeger 1986, Biometrika 73:13), and the fit weighs the data by the number of independent samples that they
 are worth. Every number has a prior spread: what the data say less about than that stays where it is.
@@ -28,6 +30,9 @@ COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
 UNDETERMINED = 0.5
 #: Evaluations of the residual in one fit, Jacobians aside.
 EVALUATIONS = 8
+#: Part of a step's change, or of the residual, that a Jacobian may get wrong and still be corrected instead
+#: of made anew.
+FORETOLD, NEGLIGIBLE = 0.3, 0.02
 
 
 @dataclass
@@ -130,6 +135,8 @@ def fit(
     prune: bool = True,
     theta: Mapping[str, float] | None = None,
     beside: tuple[Array, Array] | None = None,
+    known: tuple[Array, float] | None = None,
+    rough: bool = False,
 ) -> Fit:
     """Fit a model to the training data.
 
@@ -142,6 +149,9 @@ def fit(
         prune: leave numbers that the data do not determine where they are.
         theta: where the logarithms of the base's factors start, by name; 0 by default.
         beside: sensitivities to numbers that nobody knows, and their prior spreads; see ``Fit``.
+        known: sensitivities near the start to the first numbers, shape (rows, up to p), and what one
+            independent sample of the residual will count (or nan), where they are known.
+        rough: the covariance is not needed, nor the sensitivities at the end.
 
     Raises:
         PredictionError: the start itself could not be predicted.
@@ -152,15 +162,17 @@ def fit(
     chosen = list(frees)
     undetermined: list[Free] = []
     ties: dict[str, list[str]] = {}
-    power = math.nan
+    power = known[1] if known is not None else math.nan
     if prune and chosen:
-        chosen, undetermined, ties, power = _determined(bench, state, chosen, held_effects, blocks, theta)
+        chosen, undetermined, ties, known = _determined(bench, state, chosen, held_effects, blocks, theta)
+        power = known[1]
     vector = Vector(state, tuple(chosen), held_effects)
-    x0 = np.minimum(vector.start(theta), vector.upper())
+    lower, upper = vector.lower(), vector.upper()
+    x0 = np.clip(vector.start(theta), np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
     first = vector.state(x0)
-    start = _stacked(bench, bench.predict(first.candidate(), first.gain))
+    predictions = bench.predict(first.candidate(), first.gain)
+    start = _stacked(bench, predictions)
     if len(x0) == 0:
-        predictions = bench.predict(state.candidate(), state.gain)
         empty = np.zeros((len(start), 0))
         return Fit(state, [], x0, np.zeros((0, 0)), predictions, empty, undetermined, ties)
     if math.isnan(power):
@@ -168,28 +180,28 @@ def fit(
     worth = 1.0 / math.sqrt(power)
     priors, centre = vector.priors(), vector.start()
     centre[len(chosen) :] = np.where(
-        np.isfinite(vector.lower()[len(chosen) :]) & (priors[len(chosen) :] == SHAPE_PRIOR),
-        x0[len(chosen) :],
-        0.0,
+        np.isfinite(lower[len(chosen) :]) & (priors[len(chosen) :] == SHAPE_PRIOR), x0[len(chosen) :], 0.0
     )
+    slopes = _Slopes(bench, vector, known[0] if known is not None else None)
+    slopes.seen(x0, start)
 
     def residual(x: Array) -> Array:
-        try:
-            moved = vector.state(x)
-            rest = _stacked(bench, bench.predict(moved.candidate(), moved.gain))
-        except PredictionError:
-            rest = 10.0 * start
+        rest = slopes.rest.get(x.tobytes())
+        if rest is None:
+            try:
+                moved = vector.state(x)
+                rest = _stacked(bench, bench.predict(moved.candidate(), moved.gain))
+                slopes.seen(x, rest)
+            except PredictionError:
+                rest = 10.0 * start
         return np.concatenate([worth * rest, (x - centre) / priors])
 
     def jacobian(x: Array) -> Array:
-        columns = sensitivities(bench, vector, x)
-        return np.vstack([-worth * columns, np.diag(1.0 / priors)])
+        return np.vstack([-worth * slopes.at(x), np.diag(1.0 / priors)])
 
-    lower, upper = vector.lower(), vector.upper()
-    inside = np.clip(x0, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
     found = least_squares(
         residual,
-        inside,
+        x0,
         jac=jacobian,
         bounds=(lower, upper),
         method="trf",
@@ -200,7 +212,7 @@ def fit(
         max_nfev=evaluations,
     )
     rows = len(start)
-    columns = -found.jac[:rows] / worth
+    columns = slopes.at(found.x) if rough else slopes.exact(found.x)
     rest = found.fun[:rows] / worth
     fitted = vector.state(found.x)
     predictions = bench.predict(fitted.candidate(), fitted.gain)
@@ -209,11 +221,78 @@ def fit(
     return Fit(fitted, chosen, factors, covariance, predictions, columns, undetermined, ties, beside)
 
 
-def sensitivities(bench: Bench, vector: Vector, x: Array) -> Array:
-    """Derivatives of the whitened predictions, offsets removed, shape (rows, p)."""
+class _Slopes:
+    """The Jacobian of a fit: made anew only where the last one no longer foretells the residuals.
+
+    Args:
+        bench: the measured series.
+        vector: the free numbers.
+        known: the Jacobian near the start, shape (rows, up to p), where it is known.
+    """
+
+    def __init__(self, bench: Bench, vector: Vector, known: Array | None) -> None:
+        self._bench, self._vector = bench, vector
+        self._columns = known
+        self._at: Array | None = None if known is None else np.zeros(0)
+        #: Residuals by the bytes of where they were seen.
+        self.rest: dict[bytes, Array] = {}
+
+    def seen(self, x: Array, rest: Array) -> None:
+        """Keep a residual."""
+        self.rest[x.tobytes()] = rest
+
+    def exact(self, x: Array) -> Array:
+        """The Jacobian at ``x`` by finite differences, shape (rows, p)."""
+        self._columns, self._at = sensitivities(self._bench, self._vector, x), x.copy()
+        return self._columns
+
+    def at(self, x: Array) -> Array:
+        """The Jacobian at ``x``, corrected or made anew, shape (rows, p)."""
+        if self._columns is None or self._at is None:
+            return self.exact(x)
+        if not len(self._at):
+            # What was known counts where the fit begins.
+            rest = sensitivities(self._bench, self._vector, x, self._columns.shape[1])
+            self._columns, self._at = np.hstack([self._columns, rest]), x.copy()
+        step = x - self._at
+        if not np.any(step):
+            return self._columns
+        before, now = self.rest.get(self._at.tobytes()), self.rest.get(x.tobytes())
+        if before is None or now is None:
+            return self.exact(x)
+        change = before - now  # of the predictions
+        missed = change - self._columns @ step
+        allowed = max(FORETOLD * np.linalg.norm(change), NEGLIGIBLE * np.linalg.norm(now))
+        if np.linalg.norm(missed) > allowed:
+            return self.exact(x)
+        scaled = np.einsum("ij,ij->j", self._columns, self._columns) * step
+        self._columns = self._columns + np.outer(missed, scaled / max(float(step @ scaled), 1e-300))
+        self._at = x.copy()
+        return self._columns
+
+
+def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
+    """A rough fit with the sensitivities and the covariance where it ended."""
+    vector = Vector(found.state, tuple(at_present(found)), held_effects)
+    columns = sensitivities(bench, vector, vector.start())
+    rest = _stacked(bench, found.predictions)
+    covariance = robust_covariance(columns, rest, bench.stacked_blocks(), vector.priors(), found.beside)
+    return replace(found, columns=columns, covariance=covariance)
+
+
+def at_present(found: Fit) -> list[Free]:
+    """A fit's free numbers at their fitted values."""
+    return [
+        replace(free, value=free.value * float(np.exp(t)))
+        for free, t in zip(found.frees, found.theta, strict=True)
+    ]
+
+
+def sensitivities(bench: Bench, vector: Vector, x: Array, first: int = 0) -> Array:
+    """Derivatives of the whitened predictions, offsets removed, to the numbers from ``first`` on."""
     states = [vector.state(x)]
-    steps = vector.steps(x)
-    for k, step in enumerate(steps):
+    steps = vector.steps(x)[first:]
+    for k, step in enumerate(steps, start=first):
         shifted = x.copy()
         shifted[k] += step
         states.append(vector.state(shifted))
@@ -291,10 +370,11 @@ def _determined(
     held_effects: int,
     blocks: NDArray[np.int64],
     theta: Mapping[str, float] | None,
-) -> tuple[list[Free], list[Free], dict[str, list[str]], float]:
+) -> tuple[list[Free], list[Free], dict[str, list[str]], tuple[Array, float]]:
     """Split the numbers into those that the data determine and the others, with what each is tied to.
 
-    Also returns what one independent sample of the residual counts, once a step of the fit is taken.
+    Also returns the sensitivities to what is left to fit, and what one independent sample of the residual
+    counts once a step of the fit is taken.
 
     The scaled Jacobian's singular values say how many directions the data see; the number with the largest
     share in an unseen one is dropped, one after the other.
@@ -330,7 +410,7 @@ def _determined(
             if k != worst and abs(weakest[k]) > 0.3 and np.linalg.norm(scaled_columns[:, worst]) > 2
         ]
         kept.pop(worst)
-    return [frees[k] for k in kept], dropped, ties, power
+    return [frees[k] for k in kept], dropped, ties, (columns[:, kept + others], power)
 
 
 def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:

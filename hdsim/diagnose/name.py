@@ -5,15 +5,15 @@ The base's own numbers stay free in these fits; candidates are compared block of
 
 from __future__ import annotations
 
+import contextlib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, fit
-from hdsim.diagnose.freedom import Added, Free
+from hdsim.diagnose.fit import Fit, at_present, correlation, fit, settled
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.screen import Residual
@@ -25,13 +25,22 @@ from hdsim.effects._fitting import Inverse
 LEVEL = 0.02
 #: Least share of the weighed residual that an effect must explain to be worth a name.
 LEAST_SHARE = 0.03
-#: Candidates that are fitted in full, and the part of the best share that they must reach on the screen.
-SHORTLIST, NEAR = 5, 0.75
+#: Candidates that are fitted roughly, and the part of the best share that they must reach on the screen.
+SHORTLIST, NEAR = 9, 0.5
 #: The same part for effects that are known to look like the best, or that live in the coordinate that
 #: explains most: the screen is linear, they are not.
-ALIKE = 0.5
+ALIKE = 0.1
+#: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
+#: be fitted further.
+ROUGH, FULL, LEFT_IN = 5, 12, 2.0
 #: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
 FAR = 0.7
+#: What a fit may leave, in units of the noise, to count as one that has reached it.
+REACHED = 1.05
+#: Farthest that the base's numbers go with the screen's word alone, as a logarithm.
+FARTHEST = 2.0
+#: Part of the drive's compliance that the screen may give to an effect in series.
+SOFTEST = 0.85
 #: Part of the screen's coefficient at which a compliance's fit begins a second time.
 SMALL = 0.2
 #: Part of its share that another effect must keep beside the best to be an effect of its own.
@@ -96,16 +105,30 @@ def name_effect(
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
     shortlist = shortlist[:SHORTLIST]
     before = block_losses(bench, base.predictions)
+    fits: dict[str, Fit] = {}
+    least = math.inf
+    far = any(abs(t) > FAR for t in base.theta)
+    noise = sum(bench.noise_powers.values())
+    for again in (False, True) if far else (False,):
+        if least <= REACHED * noise:
+            break
+        for one in shortlist:
+            if again and (one.name not in fits or _loss(bench, fits[one.name]) > LEFT_IN * least):
+                continue
+            if on_step is not None:
+                on_step(f"fitting {one.name}")
+            own = _roughly(bench, base, one, residual, as_given=again)
+            own += [fits[one.name]] if one.name in fits else []
+            if own:
+                fits[one.name] = min(own, key=lambda each: _loss(bench, each))
+        least = min((_loss(bench, each) for each in fits.values()), default=math.inf)
     results: list[tuple[str, Fit, Array]] = []
-    for one in shortlist:
-        if on_step is not None:
-            on_step(f"fitting {one.name}")
-        found = _fitted(bench, base, one.added)
-        if found is None:
-            continue
-        results.append((one.name, found, block_losses(bench, found.predictions)))
-    if not results:
-        return None
+    for name, found in fits.items():
+        if _loss(bench, found) <= LEFT_IN * least:
+            if on_step is not None:
+                on_step(f"fitting {name} in full")
+            found = _fully(bench, base, found)
+        results.append((name, found, block_losses(bench, found.predictions)))
     results.sort(key=lambda result: float(result[2].sum()))
     name, found, losses = results[0]
     explained = float((before - losses).sum())
@@ -121,50 +144,93 @@ def name_effect(
         same = max(2.0 * spread, SAME * explained)
         if confusable(name, other):
             # Two formulas that both miss the noise are not told apart by less than what the better one lacks.
-            same = max(same, min(float(losses.sum()) - bench.noise_power, MISMATCH * explained))
+            same = max(same, min(float(losses.sum()) - noise, MISMATCH * explained))
         if difference.sum() < same:
             group[other] = float((before - rest).sum()) / explained
     return Named(
         name,
-        found,
+        settled(bench, found, len(base.state.added)),
         losses,
         group,
         _confidence(results, {name, *group}),
         on_screen[name].share.share,
         screening.chance,
-        {other: fitted for other, fitted, _ in results[1:]},
+        {
+            o: settled(bench, each, len(base.state.added)) if o in group else each
+            for o, each, _ in results[1:]
+        },
     )
 
 
-def _fitted(bench: Bench, base: Fit, added: Added) -> Fit | None:
-    """The model with an effect, from the re-fitted numbers and, where they went far, from the given ones.
+def _roughly(
+    bench: Bench, base: Fit, one: Screened, residual: Residual, *, as_given: bool = False
+) -> list[Fit]:
+    """The model with an effect, a few steps from where the screen says that it lies.
 
-    A base without the effect may have bent its numbers far out of the way to stand in for it.
+    Compliances that stiffen are far from linear: they start a second time closer to the base.
+
+    Args:
+        bench: the measured series.
+        base: the fitted model without the effect.
+        one: the effect on the screen.
+        residual: what it was screened on.
+        as_given: start at the base's numbers as they were given instead, for the re-fit of a base without
+            the effect may have bent them to stand in for it.
     """
-    state = replace(base.state, added=(*base.state.added, added))
-    frees = [free for free in at_present(base) if free.value > 0]
-    begins: list[dict[str, float]] = [{}]
-    if any(abs(t) > FAR for t in base.theta):
-        begins.append({free.name: -float(t) for free, t in zip(base.frees, base.theta, strict=True)})
-    evaluations = 6 + 4 * bool(added.shapes) + 6 * (len(begins) > 1)
-    states = [state]
-    if any(isinstance(term, Inverse) for term in added.fitting.terms):
-        # Compliances that stiffen are far from linear in their coefficient: a small one is a start too.
-        small = replace(added, coefficients=tuple(SMALL * c for c in added.coefficients))
-        states.append(replace(base.state, added=(*base.state.added, small)))
+    added, frees = one.added, at_present(base)
+    coefficients = np.array(added.coefficients)
+    rest = residual.values - residual.project(one.columns) @ coefficients
+    power = _power(bench, rest)
+    # The base's numbers move with the effect, as far as a linear fit of both says.
+    columns, left = base.columns[:, : len(frees)], bench.stacked(bench.residuals(base.predictions))
+    square = columns.T @ columns + np.diag([power / free.prior**2 for free in frees])
+    moves = np.linalg.solve(square, columns.T @ (left - one.columns @ coefficients))
+    series = any(isinstance(term, Inverse) for term in added.fitting.terms)
+    if series:
+        # Beside a compliance it is the drive's own compliance, not its stiffness, that moves in proportion.
+        stiff = np.array(["stiffness" in free.name for free in frees])
+        moves = np.where(stiff, -np.log1p(-np.clip(moves, None, SOFTEST)), moves)
+    moves = np.clip(moves, -FARTHEST, FARTHEST)
+    slopes = np.hstack([columns, one.columns])
+    begins = [(coefficients, moves, (slopes, power))]
+    if as_given:
+        begins = [(coefficients, -base.theta, (slopes[:, :0], power))]
+    elif series:
+        begins.append((SMALL * coefficients, SMALL * moves, (slopes, power)))
     found: list[Fit] = []
-    for state, theta in product(states, begins):
-        try:
+    for start, theta, known in begins:
+        state = replace(base.state, added=(*base.state.added, replace(added, coefficients=tuple(start))))
+        by_name = {free.name: float(t) for free, t in zip(frees, theta, strict=True)}
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             found.append(
-                fit(bench, state, frees, held_effects=len(base.state.added), prune=False,
-                    evaluations=evaluations,
-                    theta=theta, beside=base.beside)
+                fit(bench, state, frees, held_effects=len(base.state.added), prune=False, evaluations=ROUGH,
+                    theta=by_name, beside=base.beside, known=known, rough=True)
             )  # fmt: skip
-        except (PredictionError, np.linalg.LinAlgError):
-            continue
-    if not found:
-        return None
-    return min(found, key=lambda one: float(block_losses(bench, one.predictions).sum()))
+    return found
+
+
+def _fully(bench: Bench, base: Fit, found: Fit) -> Fit:
+    """A rough fit carried on to its end."""
+    theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
+    state = replace(base.state, added=found.state.added)
+    evaluations = FULL + 4 * bool(found.state.added[-1].shapes)
+    known = found.columns, _power(bench, bench.stacked(bench.residuals(found.predictions)))
+    held = len(base.state.added)
+    try:
+        full = fit(bench, state, found.frees, held_effects=held, prune=False, evaluations=evaluations,
+                   theta=theta, beside=base.beside, known=known, rough=True)  # fmt: skip
+    except (PredictionError, np.linalg.LinAlgError):
+        return found
+    return full if _loss(bench, full) < _loss(bench, found) else found
+
+
+def _power(bench: Bench, rest: Array) -> float:
+    """What one independent sample of a residual counts."""
+    return max(float(np.mean(rest**2)), 1e-30) * correlation(rest, bench.stacked_blocks())
+
+
+def _loss(bench: Bench, found: Fit) -> float:
+    return float(block_losses(bench, found.predictions).sum())
 
 
 def confusable(one: str, other: str) -> bool:
@@ -177,14 +243,6 @@ def beside(residual: Residual, one: Screened, other: Screened) -> bool:
     """Whether two traces are two effects rather than two names of one: each explains what the other can't."""
     both = residual.share(np.hstack([one.columns, other.columns])).share
     return both - one.share.share > BESIDE * other.share.share
-
-
-def at_present(base: Fit) -> list[Free]:
-    """A fit's free numbers at their fitted values."""
-    return [
-        replace(free, value=free.value * float(np.exp(t)))
-        for free, t in zip(base.frees, base.theta, strict=True)
-    ]
 
 
 def block_losses(bench: Bench, predictions: Sequence[Array]) -> Array:

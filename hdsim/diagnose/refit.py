@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -50,10 +51,11 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     found = fit(bench, state, freedoms, evaluations=5)
     align(bench, found)
     # Weights follow the residual: what the first fit explained no longer counts as noise.
-    bench.weigh(bench.residuals(found.predictions))
+    reweigh(bench, found)
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     undetermined, ties = found.undetermined, found.ties
-    found = fit(bench, state, found.frees, theta=theta, prune=False, evaluations=5)
+    slopes = found.columns, math.nan
+    found = fit(bench, state, found.frees, theta=theta, prune=False, evaluations=5, known=slopes)
     found.undetermined, found.ties = undetermined, ties
     align(bench, found)
     if undetermined and found.frees:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, fit
+from hdsim.diagnose.fit import Fit, at_present, fit
 from hdsim.diagnose.freedom import State
 from hdsim.diagnose.locate import Line, Location, locate, order_lines
 from hdsim.diagnose.measured import Array
@@ -22,7 +22,6 @@ from hdsim.diagnose.name import (
     LEVEL,
     SAME,
     Named,
-    at_present,
     block_losses,
     channel_powers,
     confusable,
@@ -82,10 +81,13 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         # Names that take each other's place would go on for ever.
         if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
             break
+        if found.named and not _more_could(bench, base, current):
+            break
         tell = during("screen", "screening the catalogue")
         stage.screening = screen(
-            bench, current.state, current.predictions, found.left, stage.location.lines, on_step=tell
-        )
+            bench, current.state, current.predictions, found.left, stage.location.lines,
+            places=stage.location.places, on_step=tell,
+        )  # fmt: skip
         ranked = stage.screening.ranked
         if not ranked or stage.screening.chance > LEVEL:
             break
@@ -111,6 +113,13 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
             reweigh(bench, current)
     found.fit = current
     return found
+
+
+def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
+    """Whether more than noise is left in some channel, enough for one more effect to matter."""
+    first, last = (channel_powers(bench, each.predictions) for each in (base, now))
+    noise = bench.noise_powers
+    return any(last[c] - noise[c] >= LATER_SHARE * first[c] for c in first)
 
 
 def _matters(bench: Bench, base: Fit, before: Fit, new: Named, others: list[Named]) -> bool:

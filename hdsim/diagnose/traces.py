@@ -15,7 +15,7 @@ import numpy as np
 
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.freedom import Added, State, number_at, signed
-from hdsim.diagnose.locate import Line
+from hdsim.diagnose.locate import Line, Place
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import CARRIED, PredictionError
 from hdsim.diagnose.screen import Residual, Share, chance_of
@@ -24,6 +24,10 @@ from hdsim.effects._fitting import Amplitude, Fitting, Inverse, Periodic
 
 #: Orders of a periodic term that are taken from the spectra.
 MOST_ORDERS = 3
+#: Starts that are many, and the share of a channel below which nothing lives in a coordinate.
+MANY, TRACELESS = 6, 2e-3
+#: Times that the shapes of the effects that explain most are refined, and the part of the best share for it.
+REFINED, REFINABLE = 2, 0.1
 #: Factor within which a trace's size must fit the residual's; else its unit is changed.
 FITTING = 4.0
 
@@ -60,6 +64,7 @@ def screen(
     residual: Residual,
     lines: Sequence[Line],
     *,
+    places: Sequence[Place] = (),
     on_step: Callable[[str], object] | None = None,
 ) -> Screening:
     """Rank every effect of the catalogue by the share of the residual that its trace explains.
@@ -70,13 +75,14 @@ def screen(
         predictions: its predictions.
         residual: what it leaves.
         lines: peaks of the order spectra.
+        places: where the residual lives; fittings with many starts are left out where theirs shows nothing.
         on_step: told what is being tried.
     """
     found = Screening()
     shares: list[Share] = []
     present = set(state.effects) | {added.effect for added in state.added}
     tried: list[Added] = []
-    ranges = bench.ranges()
+    ranges = bench.ranges(state)
     for name, kind in catalogue().items():
         fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
         if name in present and name != "sensors":
@@ -95,26 +101,34 @@ def screen(
                 continue
             if (name, fitting.label) in {(added.effect, added.fitting.label) for added in state.added}:
                 continue
-            if behind_sensor(bench, state, name, fitting):
+            if behind_sensor(bench, state, name, fitting, ranges):
                 found.skipped[name] = (
                     "acts on the load's side of the torque sensor, whose reading is the load"
                 )
                 continue
-            tried += starts(name, fitting, lines, ranges)
+            begins = starts(name, fitting, lines, ranges)
+            if len(begins) >= MANY and not _lives_there(places, kind.signature.lives_in[0]):
+                found.skipped[name] = f"nothing lives in the {kind.signature.lives_in[0].replace('_', ' ')}"
+                continue
+            tried += begins
     if on_step is not None:
         on_step(f"{len(tried)} traces")
     best: dict[str, Screened] = {}
     wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
-    for added, columns in traces(bench, state, predictions, tried, wanted):
-        if columns is None or not np.any(columns):
-            continue
-        share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
-        shares.append(share)
-        name = added.effect
-        if name not in best or share.share > best[name].share.share:
-            best[name] = Screened(
-                name, replace(added, coefficients=tuple(share.coefficients)), share, columns
-            )
+    for times in range(REFINED + 1):
+        for added, columns in traces(bench, state, predictions, tried, wanted):
+            if columns is None or not np.any(columns):
+                continue
+            share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
+            shares.append(share)
+            name = added.effect
+            if name not in best or share.share > best[name].share.share:
+                best[name] = Screened(
+                    name, replace(added, coefficients=tuple(share.coefficients)), share, columns
+                )
+        most = max((one.share.share for one in best.values()), default=0.0)
+        worth = [one for one in best.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
+        tried = [added for one in worth for added in _neighbours(one.added, times)]
     for name in catalogue():
         if name not in best:
             found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
@@ -139,7 +153,14 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
     """
     if any(isinstance(t, Amplitude) and t.of_range and t.of_range not in ranges for t in fitting.terms):
         return []
-    fitting = replace(fitting, terms=tuple(_sized(term, ranges) for term in fitting.terms))
+    shapes = [
+        replace(s, starts=tuple(v / ranges[s.over_range] for v in s.starts), over_range="")
+        if s.over_range else s
+        for s in fitting.shapes
+    ]  # fmt: skip
+    fitting = replace(
+        fitting, terms=tuple(_sized(term, ranges) for term in fitting.terms), shapes=tuple(shapes)
+    )
     orders: tuple[float, ...] = ()
     for term in fitting.terms:
         if isinstance(term, Periodic):
@@ -150,9 +171,24 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
                 return []
     count = len(signed(fitting, len(orders)))
     return [
-        Added(name, fitting, (1.0,) * count, tuple(shapes), orders)
-        for shapes in product(*(shape.starts for shape in fitting.shapes))
+        Added(name, fitting, (1.0,) * count, tuple(values), orders)
+        for values in product(*(shape.starts for shape in fitting.shapes))
     ]
+
+
+def _lives_there(places: Sequence[Place], coordinate: str) -> bool:
+    own = [place.share for place in places if place.coordinate == coordinate]
+    return not own or max(own) > TRACELESS
+
+
+def _neighbours(added: Added, times: int) -> list[Added]:
+    """The effect at unit size with each shape a little off on either side."""
+    found = []
+    for k, shape in enumerate(added.fitting.shapes):
+        for value in shape.neighbours(added.shapes[k], times):
+            shapes = (*added.shapes[:k], value, *added.shapes[k + 1 :])
+            found.append(replace(added, coefficients=(1.0,) * len(added.coefficients), shapes=shapes))
+    return found
 
 
 def _sized(term: Any, ranges: Mapping[str, float]) -> Any:
@@ -161,7 +197,9 @@ def _sized(term: Any, ranges: Mapping[str, float]) -> Any:
     return replace(_scaled(term, ranges[term.of_range]), of_range="")
 
 
-def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bool:
+def behind_sensor(
+    bench: Bench, state: State, name: str, fitting: Fitting, ranges: Mapping[str, float]
+) -> bool:
     """Whether an effect acts on the output, in records whose load is what the output's torque sensor reads.
 
     Such an effect changes the torque that the sensor has measured already, so it cannot be missing there.
@@ -169,7 +207,7 @@ def behind_sensor(bench: Bench, state: State, name: str, fitting: Fitting) -> bo
     first = bench.predictors[0]
     if first.plan.load != "output_torque":
         return False
-    for added in starts(name, fitting, (), {})[:1]:
+    for added in starts(name, fitting, (), ranges)[:1]:
         try:
             without = first.predict(state.candidate())
             tried = replace(state, added=(*state.added, added))

@@ -11,6 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+#: Ratio to the next start that a lone one would have.
+ALONE = 6.0
+
 
 @dataclass(frozen=True)
 class Amplitude:
@@ -67,10 +70,34 @@ class Periodic:
 
 @dataclass(frozen=True)
 class Shape:
-    """A field in which the trace is not linear, with the values where a fit may start."""
+    """A field in which the trace is not linear.
+
+    Args:
+        path: of the field.
+        starts: values where a fit may start, in rising order.
+        over_range: the starts are divided by the largest value that the record has of this: ``torque_nm`` at
+            the output, or ``motor_side_torque_nm``, if any.
+        linear: the field is an angle or the like, whose neighbours lie at differences, not at ratios.
+    """
 
     path: str
     starts: tuple[float, ...]
+    over_range: str = ""
+    linear: bool = False
+
+    def neighbours(self, value: float, times: int) -> tuple[float, float]:
+        """Values on both sides at the half of the starts' distance, halved ``times`` times.
+
+        Args:
+            value: the best so far.
+            times: how often it was halved before.
+        """
+        part = 0.5 ** (times + 1)
+        if self.linear:
+            gap = part * (self.starts[1] - self.starts[0])
+            return value - gap, value + gap
+        ratio = self.starts[1] / self.starts[0] if len(self.starts) > 1 else ALONE
+        return float(value / ratio**part), float(value * ratio**part)
 
 
 @dataclass(frozen=True)

@@ -55,20 +55,23 @@ class DamagedTooth(Effect):
             "torque",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (
+    fittings: ClassVar[tuple[Fitting, ...]] = tuple(
         Fitting(
             (Amplitude({"amplitude_arcmin": 0.2}, signed=True),),
-            shapes=(Shape("position_deg", (15.0, 45.0, 75.0, 105.0, 135.0, 165.0)),),
-            settings={"width_deg": 15.0},
+            shapes=(
+                Shape("position_deg", tuple(30.0 * k + 15.0 for k in range(12 // lobes)), linear=True),
+                Shape("width_deg", (12.0,)),
+            ),
+            settings={"passes_per_turn": lobes, "member": member},
+            label=label,
             turns=1.0,
-        ),
-        Fitting(
-            (Amplitude({"amplitude_arcmin": 0.2}, signed=True),),
-            shapes=(Shape("position_deg", tuple(30.0 * k + 15.0 for k in range(12))),),
-            settings={"width_deg": 15.0, "passes_per_turn": 1},
-            label="at one lobe",
-            turns=1.0,
-        ),
+        )
+        for lobes, member, label in (
+            (2, "output", ""),
+            (1, "output", "at one lobe"),
+            (2, "fixed", "of the fixed spline"),
+            (1, "fixed", "of the fixed spline, at one lobe"),
+        )
     )
 
     amplitude_arcmin: float = -0.2

@@ -35,7 +35,10 @@ class FlexsplineStiffening(Effect):
         },
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting((Inverse("stiffness_nm_per_rad", 1.0e5),), (Shape("coefficient_per_nm", (0.02, 0.08)),)),
+        Fitting(
+            (Inverse("stiffness_nm_per_rad", 1.0e5),),
+            (Shape("coefficient_per_nm", (0.7, 2.0, 6.0), "torque_nm"),),
+        ),
     )
 
     stiffness_nm_per_rad: float = Field(1.0e5, gt=0)

@@ -37,7 +37,10 @@ class WaveGeneratorCompliance(Effect):
         },
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting((Inverse("stiffness_nm_per_rad", 8.0),), (Shape("coefficient_per_nm", (0.5, 2.0, 8.0)),)),
+        Fitting(
+            (Inverse("stiffness_nm_per_rad", 8.0),),
+            (Shape("coefficient_per_nm", (0.4, 1.2, 3.6), "motor_side_torque_nm"),),
+        ),
     )
 
     stiffness_nm_per_rad: float = Field(8.0, gt=0)

@@ -71,7 +71,8 @@ def attempt(trial: Trial) -> dict[str, Any]:
     }  # fmt: skip
     started = time.perf_counter()
     try:
-        verdict = diagnose([record_of(case, log)], base_of(case)).verdict
+        diagnosis = diagnose([record_of(case, log)], base_of(case))
+        verdict, last = diagnosis.verdict, diagnosis.stages[-1].location
     except (InputError, ArithmeticError, ValueError, IndexError, KeyError) as error:
         # A diagnosis that stops is a wrong answer and is listed as one.
         words = f"{type(error).__name__}: {error}".splitlines()[0][:300]
@@ -92,6 +93,7 @@ def attempt(trial: Trial) -> dict[str, Any]:
         "right": judge(trial, verdict.verdict, names),
         "closed": closed(verdict, log),
         "covered": covered(case, verdict),
+        "left": [round(last.structured, 4), round(last.chance, 4)],
         "gap": {c: [g.before, g.refit, g.after, g.noise] for c, g in verdict.gap.items()},
         "seconds": round(time.perf_counter() - started, 1),
     }  # fmt: skip
