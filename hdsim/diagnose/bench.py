@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from hdsim.diagnose.check import noise_floor
 from hdsim.diagnose.measured import Array, Mask
-from hdsim.diagnose.predict import Candidate, PredictionError, Predictor
+from hdsim.diagnose.predict import COARSE_RTOL, Candidate, PredictionError, Predictor
 from hdsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -232,6 +233,18 @@ class Bench:
             values = found[series.record][series.channel]
             predictions.append(gain * values if series.channel == "motor_torque" else values)
         return predictions
+
+    @contextlib.contextmanager
+    def coarse(self) -> Iterator[None]:
+        """Predict with the tolerance of a search."""
+        kept = [predictor.rtol for predictor in self.predictors]
+        for predictor in self.predictors:
+            predictor.rtol = max(predictor.rtol, COARSE_RTOL)
+        try:
+            yield
+        finally:
+            for predictor, rtol in zip(self.predictors, kept, strict=True):
+                predictor.rtol = rtol
 
     def predict_all(self, states: Sequence[State]) -> list[list[Array] | None]:
         """Predictions of the training records for many models, side by side in threads.

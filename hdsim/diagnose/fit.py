@@ -21,18 +21,23 @@ from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.freedom import Added, Free, Interval, State, ceilings, scaled, signed
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
+from hdsim.effects._fitting import Inverse
 
-#: Step of finite differences in the logarithm of a number.
-STEP = 1e-2
+#: Step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which the model
+#: is further from linear.
+STEP, SMALL_STEP = 1e-1, 3e-2
 #: Prior spreads of an effect's coefficients (in units of their terms) and of the logarithm of its shapes.
 COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
 #: Ratio of posterior to prior spread above which the data are said not to determine a number.
 UNDETERMINED = 0.5
 #: Evaluations of the residual in one fit, Jacobians aside.
-EVALUATIONS = 8
-#: Part of a step's change, or of the residual, that a Jacobian may get wrong and still be corrected instead
-#: of made anew.
-FORETOLD, NEGLIGIBLE = 0.3, 0.02
+EVALUATIONS = 12
+#: Relative fall of the cost at which a round of a fit ends; rounds, and promised fall, in units of what one
+#: independent sample adds to the cost, at which no further one begins.
+ROUGHLY, ROUNDS, TIGHT = 3e-4, 3, 0.1
+#: Part of a step's change that a Jacobian may get wrong and still be corrected instead of made anew, and of
+#: the residual that it may get wrong and stay as it is.
+FORETOLD, NEGLIGIBLE = 0.3, 0.01
 
 
 @dataclass
@@ -65,22 +70,45 @@ class Fit:
 
 @dataclass(frozen=True)
 class Vector:
-    """The free numbers as one vector: logarithms, then coefficients and logarithms of shapes of effects."""
+    """The free numbers as one vector: logarithms, then coefficients and logarithms of shapes of effects.
+
+    Attributes:
+        base: the model.
+        frees: numbers of the base.
+        first: effects before this one are held fixed.
+        by_compliance: a stiffness moves by the part x of its compliance that it gives away, theta =
+            -log(1 - x): beside a compliance in series the model is linear in that, and not in theta.
+    """
 
     base: State
     frees: tuple[Free, ...]
-    first: int  # effects before this one are held fixed
+    first: int
+    by_compliance: bool = False
+
+    def _stiff(self) -> NDArray[np.bool_]:
+        return np.array([self.by_compliance and "stiffness" in free.name for free in self.frees], dtype=bool)
+
+    def logarithms(self, x: Array) -> Array:
+        """Logarithms of the base's factors at ``x``, shape (f,)."""
+        own = x[: len(self.frees)]
+        stiff = self._stiff()
+        return np.where(stiff, -np.log1p(-np.where(stiff, own, 0.0)), own)
+
+    def rates(self, x: Array) -> Array:
+        """Derivatives of the logarithms with respect to their part of ``x``, shape (f,)."""
+        return np.where(self._stiff(), np.exp(self.logarithms(x)), 1.0)
 
     def start(self, theta: Mapping[str, float] | None = None) -> Array:
         """Where a fit begins; ``theta`` replaces logarithms of the base's factors, by name."""
-        values = [(theta or {}).get(free.name, 0.0) for free in self.frees]
+        logs = np.array([(theta or {}).get(free.name, 0.0) for free in self.frees])
+        values = np.where(self._stiff(), -np.expm1(-logs), logs).tolist()
         for added in self.base.added[self.first :]:
             values += [*added.coefficients, *(math.log(shape) for shape in added.shapes)]
         return np.array(values)
 
     def state(self, x: Array) -> State:
         """The model at ``x``."""
-        state = scaled(self.base, self.frees, x[: len(self.frees)].tolist())
+        state = scaled(self.base, self.frees, self.logarithms(x).tolist())
         at = len(self.frees)
         effects = list(self.base.added[: self.first])
         for added in self.base.added[self.first :]:
@@ -100,7 +128,7 @@ class Vector:
 
     def lower(self) -> Array:
         """Lower bounds, shape (p,)."""
-        bounds = [-3.0] * len(self.frees)
+        bounds = np.where(self._stiff(), -math.expm1(3.0), -3.0).tolist()
         for added in self.base.added[self.first :]:
             bounds += [-math.inf if s else 0.0 for s in signed(added.fitting, len(added.orders))]
             bounds += [math.log(shape) - 3.0 for shape in added.shapes]
@@ -108,7 +136,7 @@ class Vector:
 
     def upper(self) -> Array:
         """Upper bounds, shape (p,)."""
-        bounds = [3.0] * len(self.frees)
+        bounds = np.where(self._stiff(), -math.expm1(-3.0), 3.0).tolist()
         for added in self.base.added[self.first :]:
             bounds += ceilings(added)
             bounds += [math.log(shape) + 3.0 for shape in added.shapes]
@@ -116,11 +144,12 @@ class Vector:
 
     def steps(self, x: Array) -> Array:
         """Steps of finite differences at ``x``, shape (p,)."""
-        steps = [STEP] * len(self.frees)
+        steps = [SMALL_STEP if "stiffness" in free.name else STEP for free in self.frees]
+        steps = (np.array(steps) / self.rates(x)).tolist()
         at = len(self.frees)
         for added in self.base.added[self.first :]:
             steps += [max(0.03, 0.03 * abs(v)) for v in x[at : at + len(added.coefficients)]]
-            steps += [5 * STEP] * len(added.shapes)
+            steps += [SMALL_STEP] * len(added.shapes)
             at += len(added.coefficients) + len(added.shapes)
         return np.array(steps)
 
@@ -166,7 +195,8 @@ def fit(
     if prune and chosen:
         chosen, undetermined, ties, known = _determined(bench, state, chosen, held_effects, blocks, theta)
         power = known[1]
-    vector = Vector(state, tuple(chosen), held_effects)
+    series = any(isinstance(t, Inverse) for added in state.added[held_effects:] for t in added.fitting.terms)
+    vector = Vector(state, tuple(chosen), held_effects, series)
     lower, upper = vector.lower(), vector.upper()
     x0 = np.clip(vector.start(theta), np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
     first = vector.state(x0)
@@ -182,7 +212,11 @@ def fit(
     centre[len(chosen) :] = np.where(
         np.isfinite(lower[len(chosen) :]) & (priors[len(chosen) :] == SHAPE_PRIOR), x0[len(chosen) :], 0.0
     )
-    slopes = _Slopes(bench, vector, known[0] if known is not None else None)
+    near = None
+    if known is not None:
+        own = min(len(chosen), known[0].shape[1])
+        near = np.hstack([known[0][:, :own] * vector.rates(x0)[:own], known[0][:, own:]])
+    slopes = _Slopes(bench, vector, near)
     slopes.seen(x0, start)
 
     def residual(x: Array) -> Array:
@@ -199,25 +233,39 @@ def fit(
     def jacobian(x: Array) -> Array:
         return np.vstack([-worth * slopes.at(x), np.diag(1.0 / priors)])
 
-    found = least_squares(
-        residual,
-        x0,
-        jac=jacobian,
-        bounds=(lower, upper),
-        method="trf",
-        x_scale="jac",
-        ftol=3e-4,
-        xtol=1e-4,
-        gtol=1e-10,
-        max_nfev=evaluations,
-    )
+    for _ in range(1 if rough else ROUNDS):
+        found = least_squares(
+            residual,
+            x0,
+            jac=jacobian,
+            bounds=(lower, upper),
+            method="trf",
+            x_scale="jac",
+            ftol=ROUGHLY,
+            xtol=1e-4,
+            gtol=1e-10,
+            max_nfev=evaluations,
+        )
+        if rough:
+            columns = slopes.at(found.x)
+            break
+        # The end is where the exact Jacobian promises less than an independent sample of the data is worth.
+        columns = slopes.exact(found.x)
+        whole = jacobian(found.x)
+        free = found.active_mask == 0
+        step, *_ = np.linalg.lstsq(whole[:, free], -found.fun, rcond=None)
+        promised = np.sum(found.fun**2) - np.sum((found.fun + whole[:, free] @ step) ** 2)
+        if promised < TIGHT:
+            break
+        x0 = found.x
     rows = len(start)
-    columns = slopes.at(found.x) if rough else slopes.exact(found.x)
     rest = found.fun[:rows] / worth
     fitted = vector.state(found.x)
     predictions = bench.predict(fitted.candidate(), fitted.gain)
+    own = len(chosen)
+    columns = np.hstack([columns[:, :own] / vector.rates(found.x), columns[:, own:]])
     covariance = robust_covariance(columns, rest, blocks, priors, beside)
-    factors = found.x[: len(chosen)]
+    factors = vector.logarithms(found.x)
     return Fit(fitted, chosen, factors, covariance, predictions, columns, undetermined, ties, beside)
 
 
@@ -262,8 +310,10 @@ class _Slopes:
             return self.exact(x)
         change = before - now  # of the predictions
         missed = change - self._columns @ step
-        allowed = max(FORETOLD * np.linalg.norm(change), NEGLIGIBLE * np.linalg.norm(now))
-        if np.linalg.norm(missed) > allowed:
+        size = float(np.linalg.norm(missed))
+        if size <= NEGLIGIBLE * np.linalg.norm(now):
+            return self._columns  # of the order of the solver's noise, from which nothing is learned
+        if size > FORETOLD * np.linalg.norm(change):
             return self.exact(x)
         scaled = np.einsum("ij,ij->j", self._columns, self._columns) * step
         self._columns = self._columns + np.outer(missed, scaled / max(float(step @ scaled), 1e-300))
@@ -272,12 +322,10 @@ class _Slopes:
 
 
 def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
-    """A rough fit with the sensitivities and the covariance where it ended."""
-    vector = Vector(found.state, tuple(at_present(found)), held_effects)
-    columns = sensitivities(bench, vector, vector.start())
-    rest = _stacked(bench, found.predictions)
-    covariance = robust_covariance(columns, rest, bench.stacked_blocks(), vector.priors(), found.beside)
-    return replace(found, columns=columns, covariance=covariance)
+    """A rough fit carried on to its very end, with the sensitivities and the covariance there."""
+    known = found.columns, math.nan
+    return fit(bench, found.state, at_present(found), held_effects=held_effects, prune=False,
+               evaluations=EVALUATIONS, beside=found.beside, known=known)  # fmt: skip
 
 
 def at_present(found: Fit) -> list[Free]:

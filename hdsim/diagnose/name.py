@@ -19,14 +19,14 @@ from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Inverse
+from hdsim.effects._fitting import Fitting, Inverse
 
 #: Largest chance at which a search may name an effect.
 LEVEL = 0.02
 #: Least share of the weighed residual that an effect must explain to be worth a name.
 LEAST_SHARE = 0.03
 #: Candidates that are fitted roughly, and the part of the best share that they must reach on the screen.
-SHORTLIST, NEAR = 9, 0.5
+SHORTLIST, NEAR = 9, 0.25
 #: The same part for effects that are known to look like the best, or that live in the coordinate that
 #: explains most: the screen is linear, they are not.
 ALIKE = 0.1
@@ -39,6 +39,8 @@ FAR = 0.7
 REACHED = 1.05
 #: Farthest that the base's numbers go with the screen's word alone, as a logarithm.
 FARTHEST = 2.0
+#: Logarithm by which a re-fit must have made the drive softer for a compliance to be suspected.
+SOFTER = 0.03
 #: Part of the drive's compliance that the screen may give to an effect in series.
 SOFTEST = 0.85
 #: Part of the screen's coefficient at which a compliance's fit begins a second time.
@@ -98,13 +100,69 @@ def name_effect(
     best = screening.ranked[0]
     known = catalogue()
 
+    # Where the re-fit made the drive softer, it may have taken any compliance in series for the drive's own.
+    softer = any(
+        "stiffness" in free.name and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True)
+    )
+
     def near(name: str) -> float:
+        fittings: tuple[Fitting, ...] = getattr(known[name], "fittings", ())
+        if softer and any(isinstance(term, Inverse) for each in fittings for term in each.terms):
+            return -math.inf
         lives = coordinate in known[name].signature.lives_in[:1]
         return ALIKE if lives or confusable(best.name, name) else NEAR
 
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
-    shortlist = shortlist[:SHORTLIST]
+    shortlist = [one for k, one in enumerate(shortlist) if k < SHORTLIST or near(one.name) == -math.inf]
     before = block_losses(bench, base.predictions)
+    with bench.coarse():
+        results = _contest(bench, base, shortlist, residual, on_step)
+    if not results:
+        return None
+    results.sort(key=lambda result: float(result[2].sum()))
+    name, found, losses = results[0]
+    explained = float((before - losses).sum())
+    if explained <= 0:
+        return None
+    group = {}
+    on_screen = {one.name: one for one in shortlist}
+    for other, rival, rest in results[1:]:
+        difference = rest - losses
+        spread = float(np.sqrt(len(difference)) * difference.std())
+        if beside(residual, on_screen[name], on_screen[other]):
+            continue
+        same = max(2.0 * spread, SAME * explained)
+        if confusable(name, other):
+            # Two formulas that both miss the noise are not told apart by less than what the better one lacks,
+            # nor a simple one from one with more freedom, which may reach the noise where it does not.
+            lacks = float(losses.sum()) - sum(bench.noise_powers.values())
+            freer = freedom(found) > freedom(rival)
+            same = max(same, MISMATCH * explained if freer else min(lacks, MISMATCH * explained))
+        if difference.sum() < same:
+            group[other] = float((before - rest).sum()) / explained
+    return Named(
+        name,
+        settled(bench, found, len(base.state.added)),
+        losses,
+        group,
+        _confidence(results, {name, *group}),
+        on_screen[name].share.share,
+        screening.chance,
+        {
+            o: settled(bench, each, len(base.state.added)) if o in group else each
+            for o, each, _ in results[1:]
+        },
+    )
+
+
+def _contest(
+    bench: Bench,
+    base: Fit,
+    shortlist: Sequence[Screened],
+    residual: Residual,
+    on_step: Callable[[str], object] | None,
+) -> list[tuple[str, Fit, Array]]:
+    """Fit every candidate roughly, and the best of them further; each with what it leaves by blocks."""
     fits: dict[str, Fit] = {}
     least = math.inf
     far = any(abs(t) > FAR for t in base.theta)
@@ -129,37 +187,7 @@ def name_effect(
                 on_step(f"fitting {name} in full")
             found = _fully(bench, base, found)
         results.append((name, found, block_losses(bench, found.predictions)))
-    results.sort(key=lambda result: float(result[2].sum()))
-    name, found, losses = results[0]
-    explained = float((before - losses).sum())
-    if explained <= 0:
-        return None
-    group = {}
-    on_screen = {one.name: one for one in shortlist}
-    for other, _, rest in results[1:]:
-        difference = rest - losses
-        spread = float(np.sqrt(len(difference)) * difference.std())
-        if beside(residual, on_screen[name], on_screen[other]):
-            continue
-        same = max(2.0 * spread, SAME * explained)
-        if confusable(name, other):
-            # Two formulas that both miss the noise are not told apart by less than what the better one lacks.
-            same = max(same, min(float(losses.sum()) - noise, MISMATCH * explained))
-        if difference.sum() < same:
-            group[other] = float((before - rest).sum()) / explained
-    return Named(
-        name,
-        settled(bench, found, len(base.state.added)),
-        losses,
-        group,
-        _confidence(results, {name, *group}),
-        on_screen[name].share.share,
-        screening.chance,
-        {
-            o: settled(bench, each, len(base.state.added)) if o in group else each
-            for o, each, _ in results[1:]
-        },
-    )
+    return results
 
 
 def _roughly(
@@ -197,6 +225,13 @@ def _roughly(
         begins = [(coefficients, -base.theta, (slopes[:, :0], power))]
     elif series:
         begins.append((SMALL * coefficients, SMALL * moves, (slopes, power)))
+        # All that the re-fit made the drive softer may be the effect's.
+        given = np.where(stiff, np.maximum(-base.theta, 0.0), 0.0)
+        size = float(
+            one.columns[:, 0] @ (columns @ np.expm1(-given)) / (one.columns[:, 0] @ one.columns[:, 0])
+        )
+        if size > 0:
+            begins.append((np.array([size]), given, (slopes, power)))
     found: list[Fit] = []
     for start, theta, known in begins:
         state = replace(base.state, added=(*base.state.added, replace(added, coefficients=tuple(start))))
@@ -231,6 +266,12 @@ def _power(bench: Bench, rest: Array) -> float:
 
 def _loss(bench: Bench, found: Fit) -> float:
     return float(block_losses(bench, found.predictions).sum())
+
+
+def freedom(found: Fit) -> int:
+    """Free numbers of a fit's last effect."""
+    added = found.state.added[-1]
+    return len(added.coefficients) + len(added.shapes)
 
 
 def confusable(one: str, other: str) -> bool:

@@ -30,8 +30,9 @@ LEAD_IN_S = 0.5
 CARRIED = "carried_torque"
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
 SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
-#: Relative tolerance of predictions: tight against the steps of finite differences.
-RTOL = 1e-5
+#: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
+#: noise in a Jacobian looks like information; and the tolerance of a search, whose steps are larger.
+RTOL, COARSE_RTOL = 1e-6, 1e-5
 
 LoadSource = Literal["scenario", "load_torque", "output_torque"]
 

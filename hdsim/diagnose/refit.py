@@ -55,7 +55,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     undetermined, ties = found.undetermined, found.ties
     slopes = found.columns, math.nan
-    found = fit(bench, state, found.frees, theta=theta, prune=False, evaluations=5, known=slopes)
+    found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes)
     found.undetermined, found.ties = undetermined, ties
     align(bench, found)
     if undetermined and found.frees:

@@ -85,7 +85,7 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
             break
         tell = during("screen", "screening the catalogue")
         stage.screening = screen(
-            bench, current.state, current.predictions, found.left, stage.location.lines,
+            bench, current.state, found.left, stage.location.lines,
             places=stage.location.places, on_step=tell,
         )  # fmt: skip
         ranked = stage.screening.ranked
@@ -141,9 +141,7 @@ def _channel(name: str) -> str:
 
 def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
     """All numbers fitted together: the base's and those of all effects."""
-    return fit(
-        bench, state or found.state, at_present(found), evaluations=4, prune=False, beside=found.beside
-    )
+    return fit(bench, state or found.state, at_present(found), prune=False, beside=found.beside)
 
 
 def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:
@@ -164,7 +162,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         for channel in bench.channels:
             lines += order_lines(bench, residuals, channel)
         tell(f"{own.name} again")
-        screening = screen(bench, without.state, without.predictions, left, lines)
+        screening = screen(bench, without.state, left, lines)
         named = None
         if screening.ranked and screening.chance <= LEVEL:
             named = name_effect(bench, without, screening, left, on_step=tell)

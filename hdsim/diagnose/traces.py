@@ -60,7 +60,6 @@ class Screening:
 def screen(
     bench: Bench,
     state: State,
-    predictions: Sequence[Array],
     residual: Residual,
     lines: Sequence[Line],
     *,
@@ -72,7 +71,6 @@ def screen(
     Args:
         bench: the measured series.
         state: the re-fitted model.
-        predictions: its predictions.
         residual: what it leaves.
         lines: peaks of the order spectra.
         places: where the residual lives; fittings with many starts are left out where theirs shows nothing.
@@ -116,7 +114,7 @@ def screen(
     best: dict[str, Screened] = {}
     wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
     for times in range(REFINED + 1):
-        for added, columns in traces(bench, state, predictions, tried, wanted):
+        for added, columns in _at_search(bench, state, tried, wanted):
             if columns is None or not np.any(columns):
                 continue
             share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
@@ -179,6 +177,14 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
 def _lives_there(places: Sequence[Place], coordinate: str) -> bool:
     own = [place.share for place in places if place.coordinate == coordinate]
     return not own or max(own) > TRACELESS
+
+
+def _at_search(
+    bench: Bench, state: State, tried: Sequence[Added], wanted: float
+) -> list[tuple[Added, Array | None]]:
+    """Traces with the tolerance of a search, the model without the effects too."""
+    with bench.coarse():
+        return traces(bench, state, bench.predict(state.candidate(), state.gain), tried, wanted)
 
 
 def _neighbours(added: Added, times: int) -> list[Added]:

@@ -34,7 +34,11 @@ class OutputBacklash(Effect):
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting((Amplitude({"backlash_arcmin": 0.3}),)),
-        Fitting((Amplitude({"backlash_arcmin": 0.5}, of_range="twist_arcmin"),)),
+        # The trace is far from linear in the play, so several plays are tried.
+        *(
+            Fitting((Amplitude({"backlash_arcmin": part}, of_range="twist_arcmin"),))
+            for part in (0.05, 0.15, 0.5)
+        ),
     )
 
     backlash_arcmin: float = Field(0.15, ge=0)
