@@ -2,10 +2,10 @@
 
 The Jacobian is made of finite differences whose step is large against the solver's noise; between two of
 them it follows the residuals that the fit sees anyway (Broyden 1965, Mathematics of Computation 19:577), for
-as long as it foretells them. Residuals of a
-model are correlated in time, so the covariance is the cluster-robust one over blocks of time (Liang and
-Zeger 1986, Biometrika 73:13), and the fit weighs the data by the number of independent samples that they
-are worth. Every number has a prior spread: what the data say less about than that stays where it is.
+as long as it foretells them. Residuals of a model are correlated in time, so the covariance is the cluster
+jackknife over blocks of time (MacKinnon, Nielsen and Webb 2023, Journal of Econometrics 232:272), and the
+fit weighs the data by the number of independent samples that they are worth. Every number has a prior
+spread: what the data say less about than that stays where it is.
 """
 
 from __future__ import annotations
@@ -378,7 +378,7 @@ def robust_covariance(
     priors: Array,
     beside: tuple[Array, Array] | None = None,
 ) -> Array:
-    """Covariance of the free numbers, clusters being blocks of time, shape (p, p).
+    """Covariance of the free numbers, shape (p, p): how they move when one block of time is left out.
 
     Args:
         columns: sensitivities to the free numbers, shape (rows, p).
@@ -392,20 +392,20 @@ def robust_covariance(
             np.hstack([columns, beside[0]]), rest, blocks, np.concatenate([priors, beside[1]])
         )
         return whole[: len(priors), : len(priors)]
-    p = columns.shape[1]
-    count = int(blocks.max()) + 1
-    scores = np.zeros((count, p))
-    for k in range(p):
-        scores[:, k] = np.bincount(blocks, columns[:, k] * rest, count)
-    used = int((np.bincount(blocks, minlength=count) > 0).sum())
     power = max(float(np.mean(rest**2)), 1e-30)
-    information = columns.T @ columns
     # The prior keeps a direction that the data say nothing about from having no spread at all.
-    bread = np.linalg.inv(information + np.diag(power / priors**2))
-    meat = scores.T @ scores * used / max(used - p, 1)
+    information = columns.T @ columns + np.diag(power / priors**2)
+    bread = np.linalg.inv(information)
+    order = np.argsort(blocks, kind="stable")
+    ends = np.flatnonzero(np.diff(blocks[order])) + 1
+    moves = []
+    for rows in np.split(order, ends):
+        own = columns[rows]
+        moves.append(np.linalg.solve(information - own.T @ own, own.T @ rest[rows]))
+    away = np.array(moves)
+    clustered = away.T @ away * (len(away) - 1) / len(away)
+    clustered += bread @ np.diag(power**2 / priors**2) @ bread
     # Few blocks can make the clustered spread too small by chance: white noise is its least.
-    meat = meat + power * np.diag(power / priors**2)
-    clustered = bread @ meat @ bread
     white = power * bread
     low = np.maximum(1.0, np.sqrt(np.diag(white) / np.maximum(np.diag(clustered), 1e-300)))
     return np.asarray(clustered * np.outer(low, low))
