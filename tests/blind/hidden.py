@@ -102,7 +102,8 @@ def tooth(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
 
 
 def tooth_expected(d: Drive, c: Changes) -> Expected:
-    return {"amplitude_arcmin": c["bump"] / ARCMIN, "position_deg": math.degrees(c["bump_at"])}
+    return {"amplitude_arcmin": c["bump"] / ARCMIN, "position_deg": math.degrees(c["bump_at"]),
+            "width_deg": math.degrees(c["bump_width"])}  # fmt: skip
 
 
 def stribeck(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
