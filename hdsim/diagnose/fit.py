@@ -31,10 +31,10 @@ COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
 #: Ratio of posterior to prior spread above which the data are said not to determine a number.
 UNDETERMINED = 0.5
 #: Evaluations of the residual in one fit, Jacobians aside.
-EVALUATIONS = 12
+EVALUATIONS = 8
 #: Relative fall of the cost at which a round of a fit ends; rounds, and promised fall, in units of what one
 #: independent sample adds to the cost, at which no further one begins.
-ROUGHLY, ROUNDS, TIGHT = 3e-4, 3, 0.1
+ROUGHLY, ROUNDS, TIGHT = 3e-4, 2, 0.25
 #: Part of a step's change that a Jacobian may get wrong and still be corrected instead of made anew, and of
 #: the residual that it may get wrong and stay as it is.
 FORETOLD, NEGLIGIBLE = 0.3, 0.01

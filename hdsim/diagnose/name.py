@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, at_present, correlation, fit, settled
+from hdsim.diagnose.fit import Fit, Vector, at_present, correlation, fit, sensitivities, settled
+from hdsim.diagnose.freedom import Added, State, scaled, signed
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.screen import Residual
-from hdsim.diagnose.traces import Screened, Screening
+from hdsim.diagnose.traces import Screened, Screening, designs
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Fitting, Inverse
+from hdsim.effects._fitting import Inverse
 
 #: Largest chance at which a search may name an effect.
 LEVEL = 0.02
@@ -31,8 +32,8 @@ SHORTLIST, NEAR = 9, 0.25
 #: explains most: the screen is linear, they are not.
 ALIKE = 0.1
 #: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
-#: be fitted further.
-ROUGH, FULL, LEFT_IN = 5, 12, 2.0
+#: be fitted further, and from the numbers as given.
+ROUGH, FULL, LEFT_IN, FAR_LEFT_IN = 5, 12, 2.0, 3.0
 #: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
 FAR = 0.7
 #: What a fit may leave, in units of the noise, to count as one that has reached it.
@@ -100,20 +101,18 @@ def name_effect(
     best = screening.ranked[0]
     known = catalogue()
 
-    # Where the re-fit made the drive softer, it may have taken any compliance in series for the drive's own.
-    softer = any(
-        "stiffness" in free.name and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True)
-    )
-
     def near(name: str) -> float:
-        fittings: tuple[Fitting, ...] = getattr(known[name], "fittings", ())
-        if softer and any(isinstance(term, Inverse) for each in fittings for term in each.terms):
-            return -math.inf
         lives = coordinate in known[name].signature.lives_in[:1]
         return ALIKE if lives or confusable(best.name, name) else NEAR
 
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
-    shortlist = [one for k, one in enumerate(shortlist) if k < SHORTLIST or near(one.name) == -math.inf]
+    shortlist = shortlist[:SHORTLIST]
+    softer = any(
+        "stiffness" in free.name and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True)
+    )
+    if softer and any(_in_series(one) for one in shortlist):
+        # The re-fit may have taken any compliance in series for the drive's own.
+        shortlist += [one for one in screening.ranked if _in_series(one) and one not in shortlist]
     before = block_losses(bench, base.predictions)
     with bench.coarse():
         results = _contest(bench, base, shortlist, residual, on_step)
@@ -155,6 +154,41 @@ def name_effect(
     )
 
 
+@dataclass
+class _Point:
+    """Where the base is linear: its numbers, and what it leaves there.
+
+    Attributes:
+        theta: logarithms of factors on the fitted base's numbers, shape (f,).
+        state: the base there.
+        predictions: its predictions.
+        columns: sensitivities to the numbers, shape (rows, f).
+        left: whitened residual, shape (rows,).
+    """
+
+    theta: Array
+    state: State
+    predictions: Sequence[Array]
+    columns: Array
+    left: Array
+
+
+def _as_given(bench: Bench, base: Fit) -> _Point:
+    """The base at its numbers before they were fitted."""
+    frees = at_present(base)
+    state = scaled(base.state, frees, (-base.theta).tolist())
+    there = [
+        replace(free, value=free.value * math.exp(-t)) for free, t in zip(frees, base.theta, strict=True)
+    ]
+    # All effects are held there.
+    vector = Vector(state, tuple(there), len(state.added))
+    predictions = bench.predict(state.candidate(), state.gain)
+    return _Point(
+        -base.theta, state, predictions, sensitivities(bench, vector, vector.start()),
+        bench.stacked(bench.residuals(predictions)),
+    )  # fmt: skip
+
+
 def _contest(
     bench: Bench,
     base: Fit,
@@ -162,84 +196,101 @@ def _contest(
     residual: Residual,
     on_step: Callable[[str], object] | None,
 ) -> list[tuple[str, Fit, Array]]:
-    """Fit every candidate roughly, and the best of them further; each with what it leaves by blocks."""
+    """Fit every candidate roughly, and the best of them further; each with what it leaves by blocks.
+
+    Where the re-fit went far the candidates are fitted from the numbers as given too: a base without the
+    effect may have bent them to stand in for it.
+    """
+    tell = on_step or (lambda _: None)
     fits: dict[str, Fit] = {}
-    least = math.inf
-    far = any(abs(t) > FAR for t in base.theta)
+
+    def keep(name: str, found: list[Fit]) -> None:
+        found += [fits[name]] if name in fits else []
+        if found:
+            fits[name] = min(found, key=lambda each: _loss(bench, each))
+
+    f = len(base.frees)
+    left = bench.stacked(bench.residuals(base.predictions))
+    here = _Point(np.zeros(f), base.state, base.predictions, base.columns[:, :f], left)
+    for one in shortlist:
+        tell(f"fitting {one.name}")
+        rest = residual.values - residual.project(one.columns) @ np.array(one.added.coefficients)
+        keep(one.name, _roughly(bench, base, here, one.added, one.columns, _power(bench, rest)))
+    if not fits:
+        return []
     noise = sum(bench.noise_powers.values())
-    for again in (False, True) if far else (False,):
-        if least <= REACHED * noise:
-            break
-        for one in shortlist:
-            if again and (one.name not in fits or _loss(bench, fits[one.name]) > LEFT_IN * least):
-                continue
-            if on_step is not None:
-                on_step(f"fitting {one.name}")
-            own = _roughly(bench, base, one, residual, as_given=again)
-            own += [fits[one.name]] if one.name in fits else []
-            if own:
-                fits[one.name] = min(own, key=lambda each: _loss(bench, each))
-        least = min((_loss(bench, each) for each in fits.values()), default=math.inf)
+    least = min(_loss(bench, each) for each in fits.values())
+    if any(abs(t) > FAR for t in base.theta) and least > REACHED * noise:
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            given = _as_given(bench, base)
+            for one in shortlist:
+                if one.name in fits and _loss(bench, fits[one.name]) <= FAR_LEFT_IN * least:
+                    tell(f"fitting {one.name} from the numbers as given")
+                    keep(one.name, _from_given(bench, base, given, one.added))
+    least = min(_loss(bench, each) for each in fits.values())
     results: list[tuple[str, Fit, Array]] = []
     for name, found in fits.items():
         if _loss(bench, found) <= LEFT_IN * least:
-            if on_step is not None:
-                on_step(f"fitting {name} in full")
+            tell(f"fitting {name} in full")
             found = _fully(bench, base, found)
         results.append((name, found, block_losses(bench, found.predictions)))
     return results
 
 
-def _roughly(
-    bench: Bench, base: Fit, one: Screened, residual: Residual, *, as_given: bool = False
-) -> list[Fit]:
-    """The model with an effect, a few steps from where the screen says that it lies.
+def _from_given(bench: Bench, base: Fit, given: _Point, added: Added) -> list[Fit]:
+    """The model with an effect, from where a linear fit at the numbers as given says that it lies."""
+    (columns,) = designs(bench, given.state, given.predictions, [added])
+    if columns is None:
+        return []
+    both = np.hstack([given.columns, columns])
+    found, *_ = np.linalg.lstsq(both, given.left, rcond=1e-6)
+    free = signed(added.fitting, len(added.orders))
+    coefficients = np.where(
+        free, found[given.columns.shape[1] :], np.maximum(found[given.columns.shape[1] :], 0.0)
+    )
+    power = _power(bench, given.left - both @ found)
+    return _roughly(bench, base, given, replace(added, coefficients=tuple(coefficients)), columns, power)
 
-    Compliances that stiffen are far from linear: they start a second time closer to the base.
+
+def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Array, power: float) -> list[Fit]:
+    """The model with an effect, a few steps from where a linear fit says that it lies.
+
+    Compliances are far from linear in their shape, and the drive's own stands in for them: they start closer
+    to the base too, and where all that the re-fit made the drive softer is theirs.
 
     Args:
         bench: the measured series.
         base: the fitted model without the effect.
-        one: the effect on the screen.
-        residual: what it was screened on.
-        as_given: start at the base's numbers as they were given instead, for the re-fit of a base without
-            the effect may have bent them to stand in for it.
+        point: where the base is linear.
+        added: the effect with its coefficients of the linear fit.
+        columns: its trace at the point, shape (rows, k).
+        power: what one independent sample of the linear fit's residual counts.
     """
-    added, frees = one.added, at_present(base)
-    coefficients = np.array(added.coefficients)
-    rest = residual.values - residual.project(one.columns) @ coefficients
-    power = _power(bench, rest)
-    # The base's numbers move with the effect, as far as a linear fit of both says.
-    columns, left = base.columns[:, : len(frees)], bench.stacked(bench.residuals(base.predictions))
-    square = columns.T @ columns + np.diag([power / free.prior**2 for free in frees])
-    moves = np.linalg.solve(square, columns.T @ (left - one.columns @ coefficients))
+    frees, coefficients = at_present(base), np.array(added.coefficients)
+    square = point.columns.T @ point.columns + np.diag([power / free.prior**2 for free in frees])
+    moves = np.linalg.solve(square, point.columns.T @ (point.left - columns @ coefficients))
+    stiff = np.array(["stiffness" in free.name for free in frees], dtype=bool)
     series = any(isinstance(term, Inverse) for term in added.fitting.terms)
     if series:
         # Beside a compliance it is the drive's own compliance, not its stiffness, that moves in proportion.
-        stiff = np.array(["stiffness" in free.name for free in frees])
         moves = np.where(stiff, -np.log1p(-np.clip(moves, None, SOFTEST)), moves)
     moves = np.clip(moves, -FARTHEST, FARTHEST)
-    slopes = np.hstack([columns, one.columns])
-    begins = [(coefficients, moves, (slopes, power))]
-    if as_given:
-        begins = [(coefficients, -base.theta, (slopes[:, :0], power))]
-    elif series:
-        begins.append((SMALL * coefficients, SMALL * moves, (slopes, power)))
-        # All that the re-fit made the drive softer may be the effect's.
-        given = np.where(stiff, np.maximum(-base.theta, 0.0), 0.0)
-        size = float(
-            one.columns[:, 0] @ (columns @ np.expm1(-given)) / (one.columns[:, 0] @ one.columns[:, 0])
-        )
+    begins = [(coefficients, moves)]
+    if series and point.state is base.state:
+        begins.append((SMALL * coefficients, SMALL * moves))
+        stiffer = np.where(stiff, np.maximum(-base.theta, 0.0), 0.0)
+        size = float(columns[:, 0] @ (point.columns @ np.expm1(-stiffer)) / (columns[:, 0] @ columns[:, 0]))
         if size > 0:
-            begins.append((np.array([size]), given, (slopes, power)))
+            begins.append((np.array([size]), stiffer))
+    held = len(base.state.added)
     found: list[Fit] = []
-    for start, theta, known in begins:
+    for start, move in begins:
         state = replace(base.state, added=(*base.state.added, replace(added, coefficients=tuple(start))))
-        by_name = {free.name: float(t) for free, t in zip(frees, theta, strict=True)}
+        theta = {free.name: float(t) for free, t in zip(frees, point.theta + move, strict=True)}
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             found.append(
-                fit(bench, state, frees, held_effects=len(base.state.added), prune=False, evaluations=ROUGH,
-                    theta=by_name, beside=base.beside, known=known, rough=True)
+                fit(bench, state, frees, held_effects=held, prune=False, evaluations=ROUGH, theta=theta,
+                    beside=base.beside, known=(np.hstack([point.columns, columns]), power), rough=True)
             )  # fmt: skip
     return found
 
@@ -257,6 +308,10 @@ def _fully(bench: Bench, base: Fit, found: Fit) -> Fit:
     except (PredictionError, np.linalg.LinAlgError):
         return found
     return full if _loss(bench, full) < _loss(bench, found) else found
+
+
+def _in_series(one: Screened) -> bool:
+    return any(isinstance(term, Inverse) for term in one.added.fitting.terms)
 
 
 def _power(bench: Bench, rest: Array) -> float:

@@ -48,7 +48,8 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     freedoms = list(base_freedoms(state, bench.channels, load_known=known) if frees is None else frees)
     before = bench.predict(state.candidate(), state.gain)
     bench.weigh(bench.residuals(before))
-    found = fit(bench, state, freedoms, evaluations=5)
+    with bench.coarse():
+        found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
     # Weights follow the residual: what the first fit explained no longer counts as noise.
     reweigh(bench, found)

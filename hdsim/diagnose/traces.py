@@ -242,7 +242,7 @@ def traces(
     Returns:
         Every effect in the units that were used, with its design, None where it could not be predicted.
     """
-    found = list(zip(tried, _designs(bench, state, predictions, tried), strict=True))
+    found = list(zip(tried, designs(bench, state, predictions, tried), strict=True))
     again: dict[int, Added] = {}
     for k, (added, columns) in enumerate(found):
         if columns is None or added.fitting.cumulative:
@@ -253,16 +253,17 @@ def traces(
             terms = tuple(_scaled(term, factor) for term in added.fitting.terms)
             again[k] = replace(added, fitting=replace(added.fitting, terms=terms))
     for (k, added), columns in zip(
-        again.items(), _designs(bench, state, predictions, list(again.values())), strict=True
+        again.items(), designs(bench, state, predictions, list(again.values())), strict=True
     ):
         if columns is not None:
             found[k] = (added, columns)
     return found
 
 
-def _designs(
+def designs(
     bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added]
 ) -> list[Array | None]:
+    """The design of every effect in its own units, see ``traces``."""
     states = []
     for added in tried:
         count = len(added.coefficients)
