@@ -164,6 +164,11 @@ class SignalData:
         found = np.unique(np.concatenate(times))
         return found[(found > start) & (found < end)]
 
+    def joints(self, start: float, end: float) -> Array:
+        """Times in (start, end), in s, where pieces meet: what does not jump there may bend. Sorted."""
+        starts = self._packed[2]
+        return starts[(starts > start) & (starts < end)]
+
     def values(self, times: ArrayLike, inside: ArrayLike | None = None) -> Array:
         """Value and three derivatives, shape (4, n), at ``times`` (s), shape (n,).
 

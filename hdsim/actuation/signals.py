@@ -157,6 +157,10 @@ class SignalModel(Parameters):
         """Times in (start, end), in s, where the signal or one of its first two derivatives jumps."""
         return self.data.corners(start, end)
 
+    def joints(self, start: float, end: float) -> Array:
+        """Times in (start, end), in s, where pieces of the signal meet."""
+        return self.data.joints(start, end)
+
     def values(self, times: ArrayLike) -> Array:
         """Value and three time derivatives, SI, shape (4, n), at ``times`` (s), shape (n,)."""
         return self.data.values(times)

@@ -23,9 +23,10 @@ from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
 from hdsim.effects._fitting import Inverse
 
-#: Step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which the model
-#: is further from linear.
-STEP, SMALL_STEP = 1e-1, 3e-2
+#: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which the
+#: model is further from linear; change of the whitened predictions, root mean square, for which a smaller step
+#: will do, and the smallest part of the largest step.
+STEP, SMALL_STEP, CHANGE, LEAST_STEP = 1e-1, 3e-2, 0.3, 3e-3
 #: Prior spreads of an effect's coefficients (in units of their terms) and of the logarithm of its shapes.
 COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
 #: Ratio of posterior to prior spread above which the data are said not to determine a number.
@@ -48,7 +49,7 @@ class Fit:
         state: the model with its fitted numbers.
         frees: the numbers of the base that were free.
         theta: logarithms of their factors, shape (f,).
-        covariance: of all free numbers, shape (p, p).
+        covariance: of all free numbers, shape (p, p); the priors' in a rough fit.
         predictions: of the training records.
         columns: sensitivities of the predictions to every free number, whitened, shape (rows, p).
         undetermined: numbers that were left where they were, because the data do not determine them.
@@ -148,7 +149,7 @@ class Vector:
         steps = (np.array(steps) / self.rates(x)).tolist()
         at = len(self.frees)
         for added in self.base.added[self.first :]:
-            steps += [max(0.03, 0.03 * abs(v)) for v in x[at : at + len(added.coefficients)]]
+            steps += [SMALL_STEP * max(1.0, abs(v)) for v in x[at : at + len(added.coefficients)]]
             steps += [SMALL_STEP] * len(added.shapes)
             at += len(added.coefficients) + len(added.shapes)
         return np.array(steps)
@@ -217,15 +218,16 @@ def fit(
         own = min(len(chosen), known[0].shape[1])
         near = np.hstack([known[0][:, :own] * vector.rates(x0)[:own], known[0][:, own:]])
     slopes = _Slopes(bench, vector, near)
-    slopes.seen(x0, start)
+    slopes.seen(x0, predictions, start)
 
     def residual(x: Array) -> Array:
         rest = slopes.rest.get(x.tobytes())
         if rest is None:
             try:
                 moved = vector.state(x)
-                rest = _stacked(bench, bench.predict(moved.candidate(), moved.gain))
-                slopes.seen(x, rest)
+                there = bench.predict(moved.candidate(), moved.gain)
+                rest = _stacked(bench, there)
+                slopes.seen(x, there, rest)
             except PredictionError:
                 rest = 10.0 * start
         return np.concatenate([worth * rest, (x - centre) / priors])
@@ -260,13 +262,13 @@ def fit(
         x0 = found.x
     rows = len(start)
     rest = found.fun[:rows] / worth
-    fitted = vector.state(found.x)
-    predictions = bench.predict(fitted.candidate(), fitted.gain)
     own = len(chosen)
     columns = np.hstack([columns[:, :own] / vector.rates(found.x), columns[:, own:]])
-    covariance = robust_covariance(columns, rest, blocks, priors, beside)
-    factors = vector.logarithms(found.x)
-    return Fit(fitted, chosen, factors, covariance, predictions, columns, undetermined, ties, beside)
+    covariance = np.diag(priors**2) if rough else robust_covariance(columns, rest, blocks, priors, beside)
+    return Fit(
+        vector.state(found.x), chosen, vector.logarithms(found.x), covariance,
+        slopes.predictions[found.x.tobytes()], columns, undetermined, ties, beside,
+    )  # fmt: skip
 
 
 class _Slopes:
@@ -282,16 +284,18 @@ class _Slopes:
         self._bench, self._vector = bench, vector
         self._columns = known
         self._at: Array | None = None if known is None else np.zeros(0)
-        #: Residuals by the bytes of where they were seen.
+        #: Predictions and whitened residuals by the bytes of where they were seen.
+        self.predictions: dict[bytes, list[Array]] = {}
         self.rest: dict[bytes, Array] = {}
 
-    def seen(self, x: Array, rest: Array) -> None:
-        """Keep a residual."""
-        self.rest[x.tobytes()] = rest
+    def seen(self, x: Array, predictions: list[Array], rest: Array) -> None:
+        """Keep what was predicted."""
+        self.predictions[x.tobytes()], self.rest[x.tobytes()] = predictions, rest
 
     def exact(self, x: Array) -> Array:
         """The Jacobian at ``x`` by finite differences, shape (rows, p)."""
-        self._columns, self._at = sensitivities(self._bench, self._vector, x), x.copy()
+        columns = self._made(x, like=self._columns)
+        self._columns, self._at = columns, x.copy()
         return self._columns
 
     def at(self, x: Array) -> Array:
@@ -300,7 +304,7 @@ class _Slopes:
             return self.exact(x)
         if not len(self._at):
             # What was known counts where the fit begins.
-            rest = sensitivities(self._bench, self._vector, x, self._columns.shape[1])
+            rest = self._made(x, self._columns.shape[1])
             self._columns, self._at = np.hstack([self._columns, rest]), x.copy()
         step = x - self._at
         if not np.any(step):
@@ -320,6 +324,10 @@ class _Slopes:
         self._at = x.copy()
         return self._columns
 
+    def _made(self, x: Array, first: int = 0, like: Array | None = None) -> Array:
+        predictions = self.predictions.get(x.tobytes())
+        return sensitivities(self._bench, self._vector, x, predictions, first=first, like=like)
+
 
 def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
     """A rough fit carried on to its very end, with the sensitivities and the covariance there."""
@@ -336,15 +344,38 @@ def at_present(found: Fit) -> list[Free]:
     ]
 
 
-def sensitivities(bench: Bench, vector: Vector, x: Array, first: int = 0) -> Array:
-    """Derivatives of the whitened predictions, offsets removed, to the numbers from ``first`` on."""
-    states = [vector.state(x)]
-    steps = vector.steps(x)[first:]
+def sensitivities(
+    bench: Bench,
+    vector: Vector,
+    x: Array,
+    predictions: list[Array] | None = None,
+    *,
+    first: int = 0,
+    like: Array | None = None,
+) -> Array:
+    """Derivatives of the whitened predictions, offsets removed, to the numbers from ``first`` on.
+
+    Args:
+        bench: the measured series.
+        vector: the numbers.
+        x: where.
+        predictions: what the model predicts there, if it is known.
+        first: index of the first number that is asked for.
+        like: sensitivities near ``x``, shape (rows, up to p): steps are then large enough for a change that
+            stands out from the solver's noise, and no larger.
+    """
+    states = [] if predictions is not None else [vector.state(x)]
+    steps = vector.steps(x)
+    if like is not None:
+        size = np.sqrt(np.mean(like**2, axis=0))
+        steps[: len(size)] *= np.clip(CHANGE / np.maximum(size * steps[: len(size)], 1e-300), LEAST_STEP, 1.0)
+    steps = steps[first:]
     for k, step in enumerate(steps, start=first):
         shifted = x.copy()
         shifted[k] += step
         states.append(vector.state(shifted))
-    base, *rest = bench.predict_all(states)
+    rest = bench.predict_all(states)
+    base = rest.pop(0) if predictions is None else predictions
     rows = len(bench.stacked_blocks())
     if base is None or not rest:
         return np.zeros((rows, len(rest)))
@@ -429,9 +460,10 @@ def _determined(
     """
     vector = Vector(state, tuple(frees), held_effects)
     x0 = vector.start(theta)
-    columns = sensitivities(bench, vector, x0)
     first = vector.state(x0)
-    rest = _stacked(bench, bench.predict(first.candidate(), first.gain))
+    predictions = bench.predict(first.candidate(), first.gain)
+    columns = sensitivities(bench, vector, x0, predictions)
+    rest = _stacked(bench, predictions)
     # What one step of the fit takes away is no noise, however far off the start is.
     step, *_ = np.linalg.lstsq(columns * vector.priors(), rest, rcond=1e-6)
     rest = rest - columns * vector.priors() @ step

@@ -184,7 +184,7 @@ def _as_given(bench: Bench, base: Fit) -> _Point:
     vector = Vector(state, tuple(there), len(state.added))
     predictions = bench.predict(state.candidate(), state.gain)
     return _Point(
-        -base.theta, state, predictions, sensitivities(bench, vector, vector.start()),
+        -base.theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
         bench.stacked(bench.residuals(predictions)),
     )  # fmt: skip
 

@@ -48,8 +48,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     freedoms = list(base_freedoms(state, bench.channels, load_known=known) if frees is None else frees)
     before = bench.predict(state.candidate(), state.gain)
     bench.weigh(bench.residuals(before))
-    with bench.coarse():
-        found = fit(bench, state, freedoms, evaluations=5, rough=True)
+    found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
     # Weights follow the residual: what the first fit explained no longer counts as noise.
     reweigh(bench, found)
@@ -61,7 +60,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     align(bench, found)
     if undetermined and found.frees:
         unknown = Vector(found.state, tuple(undetermined), 0)
-        found.beside = sensitivities(bench, unknown, unknown.start()), unknown.priors()
+        found.beside = sensitivities(bench, unknown, unknown.start(), found.predictions), unknown.priors()
         rest = bench.stacked(bench.residuals(found.predictions))
         priors = np.array([free.prior for free in found.frees])
         found.covariance = robust_covariance(

@@ -113,8 +113,12 @@ def screen(
         on_step(f"{len(tried)} traces")
     best: dict[str, Screened] = {}
     wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
+    with bench.coarse():
+        without = bench.predict(state.candidate(), state.gain)
     for times in range(REFINED + 1):
-        for added, columns in _at_search(bench, state, tried, wanted):
+        with bench.coarse():
+            tracks = traces(bench, state, without, tried, wanted)
+        for added, columns in tracks:
             if columns is None or not np.any(columns):
                 continue
             share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
@@ -124,6 +128,8 @@ def screen(
                 best[name] = Screened(
                     name, replace(added, coefficients=tuple(share.coefficients)), share, columns
                 )
+        if times == REFINED:
+            break
         most = max((one.share.share for one in best.values()), default=0.0)
         worth = [one for one in best.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
         tried = [added for one in worth for added in _neighbours(one.added, times)]
@@ -177,14 +183,6 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
 def _lives_there(places: Sequence[Place], coordinate: str) -> bool:
     own = [place.share for place in places if place.coordinate == coordinate]
     return not own or max(own) > TRACELESS
-
-
-def _at_search(
-    bench: Bench, state: State, tried: Sequence[Added], wanted: float
-) -> list[tuple[Added, Array | None]]:
-    """Traces with the tolerance of a search, the model without the effects too."""
-    with bench.coarse():
-        return traces(bench, state, bench.predict(state.candidate(), state.gain), tried, wanted)
 
 
 def _neighbours(added: Added, times: int) -> list[Added]:

@@ -162,7 +162,17 @@ def _suspect(address, t, h, y, integers, reals, scratch, f, jacobian, dfdt, tria
 
 
 @_jit
-def advance(address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces):  # type: ignore[no-untyped-def]
+def _next_stop(stops, t, t_bound):  # type: ignore[no-untyped-def]
+    """Index of the first of the increasing ``stops`` beyond t on the way to ``t_bound``; may be none's."""
+    if t_bound >= t:
+        return np.searchsorted(stops, t, side="right")
+    return np.searchsorted(stops, t, side="left") - 1
+
+
+@_jit
+def advance(  # type: ignore[no-untyped-def]
+    address, integers, reals, scratch, stops, y, atol, control, counts, work, times, states, pieces
+):
     """Take up to ``len(pieces)`` accepted steps, stopping exactly at ``control[T_BOUND]``.
 
     Args:
@@ -170,6 +180,7 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
         integers: see ``hdsim.simulation.system.System``.
         reals: likewise.
         scratch: likewise.
+        stops: increasing times at which a step has to end, shape (s,).
         y: state, shape (n,); updated.
         atol: absolute tolerance, shape (n,).
         control: shape (CONTROL_SIZE,); updated. ``control[STEP]`` is the size of the step to try (0: choose
@@ -202,8 +213,12 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
     for i in range(n):
         states[0, i] = y[i]
     counts[DONE] = 0
+    at = _next_stop(stops, t, t_bound)
 
     while counts[DONE] < len(pieces):
+        stop = t_bound
+        if 0 <= at < len(stops) and (t_bound - stops[at]) * direction > 0.0:
+            stop = stops[at]
         call_system(address, t, y, integers, reals, scratch, 1, f, jacobian, dfdt)
         counts[NFEV] += 1
         counts[NJEV] += 1
@@ -218,14 +233,14 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
         k = counts[DONE]
 
         while not accepted:
-            proposed, truncated, last = size, False, False
-            rest = abs(t_bound - t)
+            proposed, truncated, arrives = size, False, False
+            rest = abs(stop - t)
             if rest <= 1.0001 * size:
-                size, truncated, last = rest, True, True
+                size, truncated, arrives = rest, True, True
             elif rest < 2.0 * size:  # two equal steps rather than one and a crumb
                 size, truncated = 0.5 * rest, True
             h = direction * size
-            t_new = t_bound if last else t + h
+            t_new = stop if arrives else t + h
 
             diagonal = 1.0 / (h * c.GAMMA)
             for i in range(core):
@@ -337,7 +352,7 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
             following = size / factor
             if rejected:
                 following = min(following, size)
-            elif truncated:  # the end of the span, not the error, made this step short
+            elif truncated:  # the stop, not the error, made this step short
                 following = max(following, best)
             control[LAST_STEP] = size
             control[LAST_ERROR] = max(1e-2, error)
@@ -352,8 +367,10 @@ def advance(address, integers, reals, scratch, y, atol, control, counts, work, t
         control[T] = t
         counts[DONE] += 1
         counts[ACCEPTED] += 1
-        if last:
+        if arrives and stop == t_bound:
             return FINISHED
+        if arrives:
+            at += 1 if direction > 0.0 else -1
     return RUNNING
 
 
@@ -382,7 +399,21 @@ def interpolate(times, states, pieces, count, t, out):  # type: ignore[no-untype
 
 @_jit
 def run(  # type: ignore[no-untyped-def]
-    address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces, t_eval, out
+    address,
+    integers,
+    reals,
+    scratch,
+    stops,
+    y,
+    atol,
+    control,
+    counts,
+    work,
+    times,
+    states,
+    pieces,
+    t_eval,
+    out,
 ):
     """Integrate to the bound in one compiled loop; sample at increasing ``t_eval`` (m,) into ``out`` (n, m).
 
@@ -392,7 +423,7 @@ def run(  # type: ignore[no-untyped-def]
     status = RUNNING
     while status == RUNNING:
         status = advance(
-            address, integers, reals, scratch, y, atol, control, counts, work, times, states, pieces
+            address, integers, reals, scratch, stops, y, atol, control, counts, work, times, states, pieces
         )
         end = sampled
         while end < len(t_eval) and t_eval[end] <= control[T]:

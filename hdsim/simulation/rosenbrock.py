@@ -36,6 +36,7 @@ class _Block:
         first_step: float | None,
         max_step: float,
         steps: int,
+        stops: Array | None = None,
     ) -> None:
         n = system.size
         self.steps = steps
@@ -53,6 +54,7 @@ class _Block:
             system.integers,
             system.reals,
             np.zeros(max(1, system.scratch_size)),
+            np.zeros(0) if stops is None else np.ascontiguousarray(stops, dtype=np.float64),
         )
         self._work = np.empty(compiled.work_size(n, system.quadratures))
         self.renew()
@@ -110,6 +112,8 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
             in ``next_step``: spans between discontinuities can be shorter than a step.
         max_step: largest step.
         steps_per_call: accepted steps in one block.
+        stops: increasing times at which a step ends, shape (s,): where a higher derivative of the right-hand
+            side jumps, a step across it loses its order, and is mostly rejected.
 
     Attributes:
         steps: number of accepted steps.
@@ -140,6 +144,7 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
         first_step: float | None = None,
         max_step: float = np.inf,
         steps_per_call: int = 64,
+        stops: Array | None = None,
     ) -> None:
         super().__init__(fun, t0, y0, t_bound, vectorized)
         if self.n != system.size:
@@ -150,7 +155,9 @@ class Rodas4(OdeSolver):  # type: ignore[misc]
             raise ValueError("`first_step` must be positive.")
         if steps_per_call < 1:
             raise ValueError("`steps_per_call` must be at least 1.")
-        self._block = _Block(system, t0, self.y, t_bound, rtol, atol, first_step, max_step, steps_per_call)
+        self._block = _Block(
+            system, t0, self.y, t_bound, rtol, atol, first_step, max_step, steps_per_call, stops
+        )
         self._failure: int | None = None
         self._handed_over = False
 

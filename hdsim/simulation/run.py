@@ -172,6 +172,11 @@ class Run:
         times[-1] = self.duration_s
         return np.asarray(times)
 
+    def stops(self) -> Array:
+        """Times at which a prescribed motion's third derivative jumps, shape (k,): steps end there."""
+        joints = [signal.joints(0.0, self.duration_s) for signal in self.model.motions.values()]
+        return np.unique(np.concatenate([np.zeros(0), *joints]))
+
     def blocks(self, on_time: Callable[[float], object] | None = None) -> Iterator[dict[str, Table]]:
         """Integrate; yields tables by name as soon as a block of samples is complete.
 
@@ -190,7 +195,7 @@ class Run:
 
         count = math.floor(self.duration_s * self.sample_rate_hz * (1 + 1e-12)) + 1
         samples = np.arange(count) / self.sample_rate_hz
-        cuts = self.spans()
+        cuts, stops = self.spans(), self.stops()
         reals = self.model.system.reals
         y = self.y0
         step: float | None = None
@@ -225,6 +230,7 @@ class Run:
                 t_eval=np.clip(wanted, t0, t1),
                 first_step=step,
                 max_step=self.max_step_s,
+                stops=stops[np.searchsorted(stops, t0) : np.searchsorted(stops, t1)],
                 on_step=watch,
             )
             self.statistics.add(found.statistics)

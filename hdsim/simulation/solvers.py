@@ -234,6 +234,7 @@ def integrate(
     t_eval: Array | None = None,
     first_step: float | None = None,
     max_step: float = math.inf,
+    stops: Array | None = None,
     on_step: Callable[[float, Array], object] | None = None,
 ) -> Integration:
     """Integrate a system over one smooth span with ``scipy.integrate.solve_ivp``.
@@ -250,6 +251,8 @@ def integrate(
             None samples where the method comes back to Python (``rodas4``: every block of steps).
         first_step: size of the first step, cut to the span; chosen when None.
         max_step: largest step, s.
+        stops: increasing times at which steps had better end, s, shape (k,): corners of a higher derivative of
+            the right-hand side (``rodas4``; the stock methods step across them).
         on_step: called as ``on_step(t, y)`` after each step of the method (``rodas4``: block of steps). If it
             raises, the run stops there.
 
@@ -279,7 +282,7 @@ def integrate(
         options["first_step"] = first_step if chosen.compiled else min(first_step, abs(t1 - t0))
     fun: Callable[[float, Array], Array] = system.rhs
     if chosen.compiled:
-        options["system"] = system
+        options |= {"system": system, "stops": stops}
     else:
         fun = _guarded(system)
         if chosen.jacobian:

@@ -5,9 +5,11 @@ import threading
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from hdsim.errors import InputError
 from hdsim.kernel import system as system_kernel
+from hdsim.simulation.rosenbrock import Rodas4
 from hdsim.simulation.solvers import METHODS, Statistics, integrate
 from hdsim.simulation.system import System
 
@@ -38,6 +40,23 @@ def _explosion(t, y, integers, reals, scratch, want, dy, jacobian, dfdt):
     if want != 0:
         jacobian[0] = 2.0 * y[0]
         dfdt[0] = 0.0
+
+
+@system_kernel
+def _forced(t, y, integers, reals, scratch, want, dy, jacobian, dfdt):
+    """x'' = -100 x + a(t), a linear between its corners."""
+    n = integers[0]
+    k = min(max(int(math.floor(t * (n - 1) / reals[n - 1])), 0), n - 2)
+    slope = (reals[n + k + 1] - reals[n + k]) / (reals[k + 1] - reals[k])
+    dy[0] = y[1]
+    dy[1] = -100.0 * y[0] + reals[n + k] + slope * (t - reals[k])
+    if want != 0:
+        jacobian[0] = 0.0
+        jacobian[1] = 1.0
+        jacobian[2] = -100.0
+        jacobian[3] = 0.0
+        dfdt[0] = 0.0
+        dfdt[1] = slope
 
 
 def oscillator(w=10.0, bad_time=1e9, bad_position=1e9):
@@ -270,3 +289,29 @@ def test_runs_in_threads_give_the_same_bits():
         thread.join()
     for i in range(4):
         np.testing.assert_array_equal(results[i], expected)
+
+
+@pytest.mark.parametrize("span", [(0.0, 1.0), (1.0, 0.0)], ids=["forward", "backward"])
+@pytest.mark.parametrize("steps_per_call", [1, 64])
+def test_steps_end_at_the_stops(span, steps_per_call):
+    system = oscillator()
+    stops = np.array([-1.0, 0.0, 0.1, 0.1 + 1e-9, 1.0 / 3.0, 0.9, 1.0, 2.0])
+    found = solve_ivp(system.rhs, span, system.y0, method=Rodas4, system=system, rtol=1e-9, atol=1e-9,
+                      stops=stops, steps_per_call=steps_per_call, dense_output=True)  # fmt: skip
+    ends = np.concatenate([each._record[0] for each in found.sol.interpolants])
+    assert set(stops[1:-1]) <= set(ends)
+    assert found.t[-1] == span[1]
+    np.testing.assert_allclose(found.y[0, -1], np.cos(10.0), rtol=1e-6)
+
+
+def test_no_step_is_rejected_at_a_corner_of_the_forcing_that_is_a_stop():
+    # x'' = -w^2 x + a(t), a piecewise linear: what a motion that is a cubic spline does to a drive.
+    corners = np.linspace(0.0, 10.0, 101)
+    system = System(
+        _forced, np.array([len(corners)]), np.concatenate([corners, np.cos(7.0 * corners**2)]), 1,
+        np.array([1.0, 0.0]), scale=np.array([1.0, 10.0]),
+    )  # fmt: skip
+    across, cut = (integrate(system, 0.0, 10.0, system.y0, rtol=1e-7, stops=s) for s in (None, corners))
+    assert cut.statistics.rejected < 0.1 * across.statistics.rejected
+    assert cut.statistics.steps < across.statistics.steps
+    np.testing.assert_allclose(cut.y_end, across.y_end, atol=1e-4)
