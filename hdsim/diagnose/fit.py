@@ -23,9 +23,9 @@ from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
 from hdsim.effects._fitting import Inverse
 
-#: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which the
-#: model is further from linear; change of the whitened predictions, root mean square, for which a smaller step
-#: will do, and the smallest part of the largest step.
+#: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which
+#: the model is further from linear; change of the whitened predictions, root mean square, for which a smaller
+#: step will do, and the smallest part of the largest step.
 STEP, SMALL_STEP, CHANGE, LEAST_STEP = 1e-1, 3e-2, 0.3, 3e-3
 #: Prior spreads of an effect's coefficients (in units of their terms) and of the logarithm of its shapes.
 COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5

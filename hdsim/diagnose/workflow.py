@@ -40,7 +40,10 @@ LEAST_FALL = 0.03
 
 @dataclass
 class Diagnosis:
-    """Everything that a diagnosis found; ``verdict`` is its summary."""
+    """Everything that a diagnosis found; ``verdict`` is its summary.
+
+    ``explained`` is the part of all structure in the re-fitted model's residual that the names explain.
+    """
 
     verdict: Verdict
     checks: list[Check]
@@ -50,6 +53,7 @@ class Diagnosis:
     named: list[Named]
     final: Fit
     start: State
+    explained: float = 0.0
     predictions: dict[str, list[Array]] = field(default_factory=dict)
 
 
@@ -130,8 +134,8 @@ def diagnose(
     )
     last = stages[-1].location
     rest = last.structured * left.power
-    adequate = explained >= ADEQUATE * (explained + rest)
-    unknown = last.chance <= LEVEL and last.structured > STRUCTURED and not adequate
+    explained /= max(explained + rest, 1e-300)
+    unknown = last.chance <= LEVEL and last.structured > STRUCTURED and explained < ADEQUATE
     curve: CurveFit | None = None
     if unknown:
         # What explains only a part is not added; the curve of all that is missing is.
@@ -192,7 +196,7 @@ def diagnose(
     if doubts:
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
-    return Diagnosis(verdict, checks, bench, base, stages, named, current, start, predictions)
+    return Diagnosis(verdict, checks, bench, base, stages, named, current, start, explained, predictions)
 
 
 def _proved(gap: Mapping[str, Gap]) -> bool:

@@ -251,8 +251,8 @@ def integrate(
             None samples where the method comes back to Python (``rodas4``: every block of steps).
         first_step: size of the first step, cut to the span; chosen when None.
         max_step: largest step, s.
-        stops: increasing times at which steps had better end, s, shape (k,): corners of a higher derivative of
-            the right-hand side (``rodas4``; the stock methods step across them).
+        stops: increasing times at which steps had better end, s, shape (k,): corners of a higher derivative
+            of the right-hand side (``rodas4``; the stock methods step across them).
         on_step: called as ``on_step(t, y)`` after each step of the method (``rodas4``: block of steps). If it
             raises, the run stops there.
 

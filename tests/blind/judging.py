@@ -93,6 +93,7 @@ def attempt(trial: Trial) -> dict[str, Any]:
         "right": judge(trial, verdict.verdict, names),
         "closed": closed(verdict, log),
         "covered": covered(case, verdict),
+        "explained": round(diagnosis.explained, 4),
         "left": [round(last.structured, 4), round(last.chance, 4)],
         "gap": {c: [g.before, g.refit, g.after, g.noise] for c, g in verdict.gap.items()},
         "seconds": round(time.perf_counter() - started, 1),

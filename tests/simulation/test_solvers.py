@@ -46,7 +46,7 @@ def _explosion(t, y, integers, reals, scratch, want, dy, jacobian, dfdt):
 def _forced(t, y, integers, reals, scratch, want, dy, jacobian, dfdt):
     """x'' = -100 x + a(t), a linear between its corners."""
     n = integers[0]
-    k = min(max(int(math.floor(t * (n - 1) / reals[n - 1])), 0), n - 2)
+    k = min(max(int(t * (n - 1) / reals[n - 1]), 0), n - 2)
     slope = (reals[n + k + 1] - reals[n + k]) / (reals[k + 1] - reals[k])
     dy[0] = y[1]
     dy[1] = -100.0 * y[0] + reals[n + k] + slope * (t - reals[k])
