@@ -52,12 +52,15 @@ class Signature:
         channels: the contract's channels in which it shows, most telling first.
         orders: orders per wave-generator turn at which it appears, if it is periodic.
         confused_with: names of effects that can look alike, with what separates them.
+        exact: the law follows from statics or geometry alone: what it leaves in its own coordinate is no
+            error of its formula but another effect.
     """
 
     lives_in: tuple[str, ...]
     channels: tuple[str, ...]
     orders: tuple[float, ...] = ()
     confused_with: dict[str, str] = field(default_factory=dict)
+    exact: bool = False
 
 
 class Parameters(BaseModel):

@@ -189,13 +189,17 @@ _PRIORS = {
 }
 
 
-def base_freedoms(state: State, channels: Sequence[str], *, load_known: bool = False) -> list[Free]:
+def base_freedoms(
+    state: State, channels: Sequence[str], *, load_known: bool = False, locked: bool = False
+) -> list[Free]:
     """Numbers that the model has and that a fit may move: the zero ones stay zero.
 
     Args:
         state: the model.
         channels: the predicted channels; the torque's sensitivity is free when the motor's torque is one.
         load_known: the output's torque is measured and given, so nothing of the load is free.
+        locked: the output does not move: then only a second torque tells the sensitivity of the motor's from
+            the drive's own stiffness and friction.
     """
     drive, load = state.drive, state.load
     found = [_free("drive.inertia.motor_kg_m2", drive.inertia.motor_kg_m2, "kg m^2")]
@@ -220,7 +224,7 @@ def base_freedoms(state: State, channels: Sequence[str], *, load_known: bool = F
             if isinstance(value, float) and value > 0 and not any(word in field_name for word in still):
                 path = f"effects.{name}.{field_name}"
                 found.append(Free(path, (path,), 0.7, value, field_name.rpartition("_nm")[1].strip("_")))
-    if "motor_torque" in channels:
+    if "motor_torque" in channels and ("output_torque" in channels or not locked):
         found.append(Free("motor_torque_gain", ("gain",), 0.15, state.gain, "1"))
     return [free for free in found if free.value > 0]
 

@@ -12,14 +12,17 @@ from hdsim.diagnose.bench import Bench, Series
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.screen import Residual
 
-#: Corners of the piecewise linear curves over a coordinate.
-CORNERS = 9
+#: Corners of the piecewise linear curves over a coordinate; of a finer one over the output's angle, where a
+#: catch or a stop is narrow.
+CORNERS, FINE_CORNERS = 9, 40
 #: Orders per wave-generator turn that are always tried: integers; with 2 z_c / z_f and its double.
 LOBES = (1.0, 2.0, 3.0, 4.0)
 #: Order spectra: densely up to the first number, at integers up to the second.
 DENSE_ORDER, HIGHEST_ORDER = 4.6, 60
 #: Oscillators that stand for parts that ring: number, damping ratio (neighbours overlap), least frequency.
-OSCILLATORS, DAMPING_RATIO, SLOWEST_HZ = 10, 0.2, 0.5
+OSCILLATORS, DAMPING_RATIO, SLOWEST_HZ = 12, 0.2, 0.5
+#: Highest frequency of an oscillator as a part of the sampling rate.
+FASTEST = 0.3
 #: Samples of which an order spectrum is made.
 SPECTRUM_SAMPLES = 8000
 #: Share of a channel's residual that a line of an order spectrum must hold to be listed.
@@ -254,6 +257,9 @@ def _designs(
         if len(corners) < 3:
             continue
         result.append((name, _placed(bench, own, hats(values, corners)), corners))
+        if name == "output_angle":
+            fine = np.linspace(values.min(), values.max(), FINE_CORNERS)
+            result.append((name, _placed(bench, own, hats(values, fine)), fine))
         if name in ("velocity", "torque", "output_angle"):
             # Friction and loss are odd in speed: with the direction.
             turned = np.concatenate([everything[k]["direction"][bench.series[k].train] for k in own])
@@ -286,7 +292,7 @@ def oscillators(bench: Bench, series: Series) -> Array:
     rate = 1.0 / predictor.record.period_s
     slowest = max(SLOWEST_HZ, 3.0 / predictor.record.duration_s)
     columns = []
-    for frequency in np.geomspace(slowest, 0.1 * rate, OSCILLATORS):
+    for frequency in np.geomspace(slowest, FASTEST * rate, OSCILLATORS):
         w = 2 * np.pi * frequency
         bottom = [1.0, 2.0 * DAMPING_RATIO * w, w * w]
         columns += [

@@ -282,6 +282,10 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
         size = float(columns[:, 0] @ (point.columns @ np.expm1(-stiffer)) / (columns[:, 0] @ columns[:, 0]))
         if size > 0:
             begins.append((np.array([size]), stiffer))
+    if added.fitting.play:
+        # By as much as the trace is too small, the spring beyond the play is stiffer.
+        beyond = math.log(max(float(coefficients[0]), 1.0))
+        begins.append((np.ones(1), np.clip(np.where(stiff, beyond, moves), -FARTHEST, FARTHEST)))
     held = len(base.state.added)
     found: list[Fit] = []
     for start, move in begins:

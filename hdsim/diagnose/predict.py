@@ -17,7 +17,7 @@ import numpy as np
 
 from hdsim.diagnose.measured import Array, Record
 from hdsim.diagnose.spline import TAIL_S, signal, smoothed
-from hdsim.errors import InputError
+from hdsim.errors import InputError, PhysicsError
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
@@ -175,7 +175,7 @@ class Predictor:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
 
         Raises:
-            PredictionError: the model could not be integrated.
+            PredictionError: the model cannot be, or could not be integrated.
         """
         from hdsim.actuation.shapes import Hold
         from hdsim.actuation.signal_data import SignalData
@@ -192,13 +192,16 @@ class Predictor:
         motions: dict[str, Any] = {"motor": self.motion}
         if self.plan.locked:
             motions["output"] = SignalData(Hold().move())
-        model = Model(
-            candidate.drive,
-            parts,
-            load_inertia_kg_m2=load.inertia_kg_m2,
-            motions=motions,
-            seed=candidate.seed,
-        )
+        try:
+            model = Model(
+                candidate.drive,
+                parts,
+                load_inertia_kg_m2=load.inertia_kg_m2,
+                motions=motions,
+                seed=candidate.seed,
+            )
+        except PhysicsError as error:
+            raise PredictionError(str(error)) from None
         period = self.record.period_s
         run = Run(
             model,

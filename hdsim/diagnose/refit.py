@@ -45,7 +45,10 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         frees: numbers that may move; all that the base has when None.
     """
     known = all(predictor.plan.load == "output_torque" for predictor in bench.predictors)
-    freedoms = list(base_freedoms(state, bench.channels, load_known=known) if frees is None else frees)
+    locked = all(predictor.plan.locked for predictor in bench.predictors)
+    if frees is None:
+        frees = base_freedoms(state, bench.channels, load_known=known, locked=locked)
+    freedoms = list(frees)
     before = bench.predict(state.candidate(), state.gain)
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5, rough=True)

@@ -38,6 +38,8 @@ MOST_EFFECTS, MOST_STAGES = 4, 7
 #: Part of a channel's first residual that a later effect must explain; more where it can look like what an
 #: effect that is there already leaves, because the true formula is never quite the catalogue's.
 LATER_SHARE, LATER_ALIKE = 0.02, 0.1
+#: Part of what is left by which it must have fallen for the last name to be asked again.
+NEWS = 0.1
 
 Step = Callable[[str], object]
 
@@ -145,9 +147,15 @@ def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
 
 
 def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:
-    """Ask every name but the last again; ``found.named`` is changed in place."""
+    """Ask every name again; ``found.named`` is changed in place.
+
+    The last one was asked beside the others, and is so again only where they have changed since.
+    """
+    first = _loss(bench, current)
     k = 0
-    while k < len(found.named) - 1:
+    while k < len(found.named):
+        if k == len(found.named) - 1 and _loss(bench, current) > (1.0 - NEWS) * first:
+            break
         own = found.named[k]
         added = list(current.state.added)
         others = added[:k] + added[k + 1 :]
@@ -172,7 +180,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             found.named.pop(k)
             current = without
             continue
-        loss, now = (float(block_losses(bench, each.predictions).sum()) for each in (current, named.fit))
+        loss, now = _loss(bench, current), _loss(bench, named.fit)
         same = named.name == own.name or own.name in named.group
         if same or now < (1.0 - SAME) * loss:
             own = named if named.name == own.name or not same else own
@@ -187,6 +195,10 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             found.named[k] = own
         k += 1
     return current
+
+
+def _loss(bench: Bench, found: Fit) -> float:
+    return float(block_losses(bench, found.predictions).sum())
 
 
 def left_of(bench: Bench, current: Fit) -> Residual:

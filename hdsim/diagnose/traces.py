@@ -20,7 +20,7 @@ from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import CARRIED, PredictionError
 from hdsim.diagnose.screen import Residual, Share, chance_of
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Amplitude, Fitting, Inverse, Periodic
+from hdsim.effects._fitting import WIDER, Amplitude, Fitting, Inverse, Periodic
 
 #: Orders of a periodic term that are taken from the spectra.
 MOST_ORDERS = 3
@@ -186,8 +186,18 @@ def _lives_there(places: Sequence[Place], coordinate: str) -> bool:
 
 
 def _neighbours(added: Added, times: int) -> list[Added]:
-    """The effect at unit size with each shape a little off on either side."""
+    """The effect at unit size with each shape, or the width of its play, a little off on either side."""
     found = []
+    if added.fitting.play:
+        for factor in (WIDER ** (-(0.5 ** (times + 1))), WIDER ** (0.5 ** (times + 1))):
+            terms = tuple(_scaled(term, factor) for term in added.fitting.terms)
+            found.append(
+                replace(
+                    added,
+                    fitting=replace(added.fitting, terms=terms),
+                    coefficients=(1.0,) * len(added.coefficients),
+                )
+            )
     for k, shape in enumerate(added.fitting.shapes):
         for value in shape.neighbours(added.shapes[k], times):
             shapes = (*added.shapes[:k], value, *added.shapes[k + 1 :])
@@ -243,7 +253,7 @@ def traces(
     found = list(zip(tried, designs(bench, state, predictions, tried), strict=True))
     again: dict[int, Added] = {}
     for k, (added, columns) in enumerate(found):
-        if columns is None or added.fitting.cumulative:
+        if columns is None or added.fitting.cumulative or added.fitting.play:
             continue
         size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
         if size > 0 and not wanted / FITTING < size < wanted * FITTING:

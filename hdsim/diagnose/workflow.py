@@ -15,11 +15,13 @@ from hdsim.diagnose.check import Check, check_record
 from hdsim.diagnose.curve import CurveFit, fit_curve
 from hdsim.diagnose.fit import Fit, added_spreads, base_intervals
 from hdsim.diagnose.freedom import Interval, State, state_of
+from hdsim.diagnose.locate import Location
 from hdsim.diagnose.measured import Array, Record, record_from
 from hdsim.diagnose.name import LEVEL, Named, block_losses
 from hdsim.diagnose.predict import LoadSource, PredictionError, predictors
 from hdsim.diagnose.prove import gaps
 from hdsim.diagnose.refit import Refit, refit
+from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.search import Stage, search
 from hdsim.diagnose.staging import staged
 from hdsim.diagnose.suspect import suspicions
@@ -32,8 +34,8 @@ if TYPE_CHECKING:
     from hdsim.scenario import Scenario
 
 #: Share of the weighed residual that must be structured for ``unknown``, and the part of all structure that
-#: the named effects must explain to be believed.
-STRUCTURED, ADEQUATE = 0.12, 0.9
+#: the named effects must explain to be believed; the same share in the own coordinate of an exact law.
+STRUCTURED, ADEQUATE, OWN = 0.12, 0.95, 0.05
 #: Least relative fall of a held-out gap for the verdict ``parameter``.
 LEAST_FALL = 0.03
 
@@ -135,7 +137,10 @@ def diagnose(
     last = stages[-1].location
     rest = last.structured * left.power
     explained /= max(explained + rest, 1e-300)
-    unknown = last.chance <= LEVEL and last.structured > STRUCTURED and explained < ADEQUATE
+    misfit = last.structured > STRUCTURED and explained < ADEQUATE
+    misfit |= last.structured > OWN and any(_off_its_law(one, last) for one in named)
+    unknown = last.chance <= LEVEL and misfit
+    rest_of = None if named or unknown else remainder(bench, current.predictions)
     curve: CurveFit | None = None
     if unknown:
         # What explains only a part is not added; the curve of all that is missing is.
@@ -175,6 +180,13 @@ def diagnose(
             curve=curve.found() if curve is not None else None,
             **common,
         )
+    elif rest_of is not None:
+        verdict = Verdict(
+            verdict="unknown",
+            sentence=f"Something is missing that nothing in the catalogue explains: {rest_of}; "
+            "it is a function of no coordinate that these data repeat.",
+            **common,
+        )
     elif named:
         effects = _effects(named, current)
         words = " and ".join(_words(effect) for effect in effects)
@@ -197,6 +209,12 @@ def diagnose(
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
     return Diagnosis(verdict, checks, bench, base, stages, named, current, start, explained, predictions)
+
+
+def _off_its_law(one: Named, last: Location) -> bool:
+    """Whether an effect with an exact law leaves most in its own coordinate."""
+    signature = catalogue()[one.name].signature
+    return signature.exact and last.places[0].coordinate == signature.lives_in[0]
 
 
 def _proved(gap: Mapping[str, Gap]) -> bool:

@@ -108,8 +108,12 @@ def spring_cells(
     """
     from scipy.interpolate import PchipInterpolator
 
-    torque = np.unique(np.concatenate([np.linspace(0.0, largest_torque_nm, 4001), np.asarray(corners_nm)]))
-    torque = torque[torque <= largest_torque_nm]
+    # Denser towards zero, where a play is taken up.
+    near = np.geomspace(1e-6, 1e-1, 400) * largest_torque_nm
+    even = np.linspace(0.0, largest_torque_nm, 4001)
+    torque = np.unique(np.concatenate([even, near, np.asarray(corners_nm)]))
+    apart = np.diff(torque, prepend=-1.0) > 1e-10 * largest_torque_nm
+    torque = torque[apart & (torque <= largest_torque_nm)]
     twist = scale * np.sum([wind_up(torque) for wind_up in wind_ups], axis=0)
     if np.any(np.diff(twist) <= 0):
         bad = torque[int(np.argmax(np.diff(twist) <= 0))]

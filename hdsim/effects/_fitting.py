@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-#: Ratio to the next start that a lone one would have.
-ALONE = 6.0
+#: Ratio to the next start that a lone one would have, and of the widths of a play that are tried.
+ALONE, WIDER = 6.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,14 @@ class Amplitude:
         units: field to its value at coefficient 1.
         signed: the coefficient may be negative.
         of_range: the units are parts of a range that the record covers: ``twist_arcmin``, if any.
+        play: the units are the width of a play in series with the drive's spring. Its trace beside the
+            spring's is the spring beyond the play: its size says how stiff that is, not how wide the play.
     """
 
     units: Mapping[str, float]
     signed: bool = False
     of_range: str = ""
+    play: bool = False
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,11 @@ class Fitting:
     turns: float = 0.0
     covered_by: tuple[str, ...] = ()
     cumulative: bool = False
+
+    @property
+    def play(self) -> bool:
+        """Whether it fits the width of a play."""
+        return any(isinstance(term, Amplitude) and term.play for term in self.terms)
 
     def items(self, section: str) -> list[Any]:
         """Items that a list of the effect has before periodic terms add theirs."""

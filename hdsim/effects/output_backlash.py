@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.effects._fitting import WIDER, Amplitude, Fitting, Shape
 from hdsim.effects._kernels import ARCMIN
 from hdsim.parts import Builder, Effect, Signature
 
+if TYPE_CHECKING:
+    from hdsim.parts import Array
+
+#: Widths of the play that are tried, as parts of the twist that a record covers.
+_PARTS = (0.05, 0.05 * WIDER, 0.05 * WIDER**2)
+
 
 class OutputBacklash(Effect):
-    """Every tooth's gap is wider by the same angle at the output: half-gap + backlash/2."""
+    """Every tooth's gap is wider by the same angle at the output: half-gap + backlash/2.
+
+    With a coefficient C the play b is taken up gradually, as where no two teeth have the same gap, and the
+    drive rests in its middle: d = b/2 tanh(C tau) in series with the torsion spring, sharp as C grows.
+    """
 
     title: ClassVar[str] = "backlash (wear)"
     source: ClassVar[str] = (
@@ -34,16 +44,35 @@ class OutputBacklash(Effect):
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting((Amplitude({"backlash_arcmin": 0.3}),)),
-        # The trace is far from linear in the play, so several plays are tried.
         *(
-            Fitting((Amplitude({"backlash_arcmin": part}, of_range="twist_arcmin"),))
-            for part in (0.05, 0.15, 0.5)
+            Fitting((Amplitude({"backlash_arcmin": part}, of_range="twist_arcmin", play=True),))
+            for part in _PARTS
+        ),
+        *(
+            Fitting(
+                (Amplitude({"backlash_arcmin": part}, of_range="twist_arcmin", play=True),),
+                (Shape("coefficient_per_nm", (5.0, 30.0), "torque_nm"),),
+                label="taken up gradually",
+            )
+            for part in _PARTS[1:]
         ),
     )
 
     backlash_arcmin: float = Field(0.15, ge=0)
     """Additional total play at the output, arcmin."""
+    coefficient_per_nm: float | None = Field(None, gt=0)
+    """Coefficient C, 1/(N m): three quarters of the play are taken up at the torque 1/C; else a sharp gap."""
 
     def contribute(self, build: Builder) -> None:
-        """Widen the gap of the mesh."""
-        build.widen_gap(0.5 * self.backlash_arcmin * ARCMIN)
+        """Widen the gap of the mesh, or put the gradual play in series with the torsion spring."""
+        half, coefficient = 0.5 * self.backlash_arcmin * ARCMIN, self.coefficient_per_nm
+        if coefficient is None:
+            build.widen_gap(half)
+            return
+
+        def wind_up(torque: Array) -> Array:
+            import numpy as np
+
+            return half * np.tanh(coefficient * torque)
+
+        build.series_compliance(wind_up)

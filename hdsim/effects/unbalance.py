@@ -37,6 +37,7 @@ class Unbalance(Effect):
         lives_in=("output_angle", "wave_generator_angle"),
         channels=("motor_torque", "output_torque", "output_angle"),
         orders=(0.01, 1.0),
+        exact=True,
         confused_with={
             "output_eccentricity": "kinematic: shows in the output angle without torque",
             "wave_generator_eccentricity": "kinematic: its torque grows with the load, an unbalance's does "

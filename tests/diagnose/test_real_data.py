@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hdsim
@@ -11,12 +12,15 @@ from hdsim.diagnose.workflow import diagnose
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"
 KINOVA = DATA / "kinova-gen3-7dof" / "validation_data" / "opti_traj_testing1.csv"
+CYCLOIDAL = DATA / "cycloidal-backlash-hysteresis" / "2024-07-11__15-56-27__torqueramp__base_runin6.csv"
 
 #: Coulomb friction (N m at the output) of a straight-line fit of motor torque less sensor torque over the
 #: velocity and its sign.
 FRICTION = {1: 2.66, 3: 2.17, 4: 2.44, 6: 1.18}
 #: Names of one thing for these data: friction that turns with the direction.
 FRICTIONS = {"input_coulomb_viscous", "lugre_friction", "load_dependent_loss", "stribeck_friction"}
+
+HYSTERESES = {"torsional_hysteresis_maxwell", "torsional_hysteresis_duhem"}
 
 
 def kinova(joint: int):
@@ -49,3 +53,23 @@ def test_kinova_joints_lack_friction_first_and_the_gap_falls_below_a_third(joint
     if joint == 6:
         # The torque sensor ripples twice a wave-generator turn: 200 per output turn behind a ratio of 100.
         assert 2.0 in orders(next(effect for effect in found.effects if effect.name == "sensors"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not CYCLOIDAL.exists(), reason="the recordings are not here")
+def test_a_cycloidal_actuator_has_play_of_the_loops_own_width_and_hysteresis():
+    mapping = ROOT / "scenarios" / "mappings" / "cycloidal_torque_ramp.yaml"
+    record = record_from(hdsim.import_recording(CYCLOIDAL, mapping), "ramps")
+    # Where the torque goes through zero, from one flank to the other, at the output.
+    turns = np.flatnonzero(np.diff(np.sign(record.filled("motor_torque"))))
+    crossings = np.degrees(record.filled("motor_angle")[turns] / 14) * 60
+    width = float(np.ptp(np.quantile(crossings, [0.02, 0.98])))
+    base = hdsim.load_scenario(ROOT / "scenarios" / "bases" / "cycloidal_linear_spring.yaml")
+    found = diagnose([record], base).verdict
+    assert found.verdict == "effect"
+    names = [{effect.name, *effect.indistinguishable_from} for effect in found.effects]
+    assert any(group & HYSTERESES for group in names)
+    play = next(effect for effect in found.effects if effect.name == "output_backlash")
+    assert len(play.indistinguishable_from) <= 2
+    assert play.parameters["backlash_arcmin"].value == pytest.approx(width, rel=0.15)
+    assert found.gap["motor_torque"].after < 0.4 * found.gap["motor_torque"].refit

@@ -1,0 +1,76 @@
+"""Step 8, what is left of the noise: a rest that is plainly more than noise is said, wherever it lives.
+
+What happens once cannot be cross-validated, and what lives in no coordinate of the catalogue has no place;
+neither is a reason to call a model complete.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.measured import Array
+
+#: Rest over the noise, root mean square, above which it isn't noise; below 1.25 where nothing is missing.
+EXCESS = 1.6
+#: Part of the rest's excess power that the stretch where it lives must hold.
+MOST = 0.8
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left of a channel.
+
+    Attributes:
+        record: name of the record.
+        channel: the channel.
+        ratio: root mean square of the rest over that of the noise, in the worst block.
+        start_s: begin of the stretch that holds most of it.
+        end_s: its end.
+        whole: the stretch is more than half of the record.
+    """
+
+    record: str
+    channel: str
+    ratio: float
+    start_s: float
+    end_s: float
+    whole: bool
+
+    def __str__(self) -> str:
+        when = "all over the record" if self.whole else f"between {self.start_s:.3g} and {self.end_s:.3g} s"
+        size = f"up to {self.ratio:.2g} times its noise"
+        return f"what is left of {self.channel} in {self.record} is {size}, {when}"
+
+
+def remainder(bench: Bench, predictions: Sequence[Array]) -> Remainder | None:
+    """The channel that is left with most beyond its noise; None where noise is all that is left.
+
+    Args:
+        bench: the measured series.
+        predictions: of the training records.
+    """
+    worst: Remainder | None = None
+    for series, residual in zip(bench.series, bench.residuals(predictions), strict=True):
+        if series.record >= bench.training or not series.train.any():
+            continue
+        record = bench.predictors[series.record].record
+        square = (residual[series.train] / max(series.noise, 1e-300)) ** 2
+        block = series.block[series.train] - series.block.min()
+        counts = np.bincount(block)
+        used = counts > 0
+        powers = np.bincount(block, square)[used] / counts[used]
+        ratio = float(np.sqrt(powers.max()))
+        if np.sqrt(square.mean()) < EXCESS or (worst is not None and worst.ratio > ratio):
+            continue
+        beyond = np.maximum(powers - 1.0, 0.0)
+        order = np.argsort(-beyond)
+        needed = int(np.searchsorted(np.cumsum(beyond[order]), MOST * beyond.sum())) + 1
+        inside = np.isin(block, np.flatnonzero(used)[order[:needed]])
+        times = record.time[series.train][inside]
+        whole = float(np.ptp(times)) > 0.5 * record.duration_s
+        worst = Remainder(record.name, series.channel, ratio, float(times[0]), float(times[-1]), whole)
+    return worst
