@@ -214,8 +214,9 @@ def _contest(
     here = _Point(np.zeros(f), base.state, base.predictions, base.columns[:, :f], left)
     for one in shortlist:
         tell(f"fitting {one.name}")
-        rest = residual.values - residual.project(one.columns) @ np.array(one.added.coefficients)
-        keep(one.name, _roughly(bench, base, here, one.added, one.columns, _power(bench, rest)))
+        for each in (one, *one.others):
+            rest = residual.values - residual.project(each.columns) @ np.array(each.added.coefficients)
+            keep(one.name, _roughly(bench, base, here, each.added, each.columns, _power(bench, rest)))
     if not fits:
         return []
     noise = sum(bench.noise_powers.values())
@@ -226,7 +227,8 @@ def _contest(
             for one in shortlist:
                 if one.name in fits and _loss(bench, fits[one.name]) <= FAR_LEFT_IN * least:
                     tell(f"fitting {one.name} from the numbers as given")
-                    keep(one.name, _from_given(bench, base, given, one.added))
+                    for each in (one, *one.others):
+                        keep(one.name, _from_given(bench, base, given, each.added))
     least = min(_loss(bench, each) for each in fits.values())
     results: list[tuple[str, Fit, Array]] = []
     for name, found in fits.items():

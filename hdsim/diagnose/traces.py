@@ -28,18 +28,24 @@ MOST_ORDERS = 3
 MANY, TRACELESS = 6, 2e-3
 #: Times that the shapes of the effects that explain most are refined, and the part of the best share for it.
 REFINED, REFINABLE = 2, 0.1
+#: Part of its best fitting's share that another kind of fitting must reach to be fitted too.
+KINDRED = 0.8
 #: Factor within which a trace's size must fit the residual's; else its unit is changed.
 FITTING = 4.0
 
 
 @dataclass
 class Screened:
-    """An effect on the screen: the fitting of it that explains most, and its trace, shape (rows, k)."""
+    """An effect on the screen: the fitting of it that explains most, and its trace, shape (rows, k).
+
+    ``others`` are fittings of other kinds that explain nearly as much.
+    """
 
     name: str
     added: Added
     share: Share
     columns: Array
+    others: list[Screened] = field(default_factory=list)
 
 
 @dataclass
@@ -80,6 +86,7 @@ def screen(
     shares: list[Share] = []
     present = set(state.effects) | {added.effect for added in state.added}
     tried: list[Added] = []
+    many: list[Added] = []
     ranges = bench.ranges(state)
     for name, kind in catalogue().items():
         fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
@@ -105,39 +112,47 @@ def screen(
                 )
                 continue
             begins = starts(name, fitting, lines, ranges)
-            if len(begins) >= MANY and not _lives_there(places, kind.signature.lives_in[0]):
-                found.skipped[name] = f"nothing lives in the {kind.signature.lives_in[0].replace('_', ' ')}"
-                continue
-            tried += begins
+            (tried if len(begins) < MANY else many).extend(begins)
     if on_step is not None:
         on_step(f"{len(tried)} traces")
-    best: dict[str, Screened] = {}
+    kinds: dict[tuple[str, str], Screened] = {}
     wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
     with bench.coarse():
         without = bench.predict(state.candidate(), state.gain)
-    for times in range(REFINED + 1):
+
+    def look(several: Sequence[Added]) -> None:
         with bench.coarse():
-            tracks = traces(bench, state, without, tried, wanted)
-        for added, columns in tracks:
+            found_traces = traces(bench, state, without, several, wanted)
+        for added, columns in found_traces:
             if columns is None or not np.any(columns):
                 continue
             share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
             shares.append(share)
-            name = added.effect
-            if name not in best or share.share > best[name].share.share:
-                best[name] = Screened(
-                    name, replace(added, coefficients=tuple(share.coefficients)), share, columns
-                )
-        if times == REFINED:
-            break
-        most = max((one.share.share for one in best.values()), default=0.0)
-        worth = [one for one in best.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
-        tried = [added for one in worth for added in _neighbours(one.added, times)]
+            key = added.effect, added.fitting.label
+            if key not in kinds or share.share > kinds[key].share.share:
+                added = replace(added, coefficients=tuple(share.coefficients))
+                kinds[key] = Screened(added.effect, added, share, columns)
+
+    look(tried)
+    # A residual may live in a coordinate that only an effect's trace shows, as it rings on its way.
+    alive = {_home(one.name) for one in kinds.values() if one.share.share > TRACELESS}
+    alive |= {place.coordinate for place in places if place.share > TRACELESS}
+    look([added for added in many if _home(added.effect) in alive or not places])
+    for name in {added.effect for added in many if _home(added.effect) not in alive and places}:
+        found.skipped[name] = f"nothing lives in the {_home(name).replace('_', ' ')}"
+    for times in range(REFINED):
+        most = max((one.share.share for one in kinds.values()), default=0.0)
+        worth = [one for one in kinds.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
+        look([added for one in worth for added in _neighbours(one.added, times)])
+    best: dict[str, Screened] = {}
+    for one in sorted(kinds.values(), key=lambda one: -one.share.share):
+        first = best.setdefault(one.name, one)
+        if one is not first and one.share.share >= KINDRED * first.share.share:
+            first.others.append(one)
     for name in catalogue():
         if name not in best:
             found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
     found.ranked += best.values()
-    found.ranked.sort(key=lambda one: -one.share.share)
     if found.ranked:
         found.chance = chance_of(found.ranked[0].share, shares)
     return found
@@ -180,9 +195,9 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
     ]
 
 
-def _lives_there(places: Sequence[Place], coordinate: str) -> bool:
-    own = [place.share for place in places if place.coordinate == coordinate]
-    return not own or max(own) > TRACELESS
+def _home(name: str) -> str:
+    """The coordinate in which an effect shows most."""
+    return catalogue()[name].signature.lives_in[0]
 
 
 def _neighbours(added: Added, times: int) -> list[Added]:
