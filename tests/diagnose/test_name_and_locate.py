@@ -1,4 +1,5 @@
 import json
+import re
 
 import numpy as np
 import pytest
@@ -80,6 +81,34 @@ def test_what_the_catalogue_does_not_hold_is_unknown(tmp_path):
     assert found.verdict == "unknown"
     assert found.effects == []
     assert found.located[0].coordinate in ("output_angle", "time")
+
+
+def test_what_happens_once_is_said_with_its_time(tmp_path):
+    # Nothing of it repeats, so no block of time foretells another; yet it is plainly no noise.
+    record = rigid_record(12.0, seed=5)
+    once = (record.time > 2.2) & (record.time < 2.5)
+    record.channels["motor_torque"][once] += 0.02 * np.sin(np.pi * (record.time[once] - 2.2) / 0.3)
+    found = diagnose([record], scenario(tmp_path)).verdict
+    assert found.verdict == "unknown"
+    begin, end = map(float, re.findall(r"between ([0-9.]+) and ([0-9.]+) s", found.sentence)[0])
+    assert begin == pytest.approx(2.2, abs=0.3)
+    assert end == pytest.approx(2.5, abs=0.3)
+
+
+def test_a_cable_is_no_unbalance_though_that_explains_most_of_it(tmp_path):
+    # A weight's torque is a cosine of the output's angle, by statics; what is left there is not its error.
+    def cable(angle, velocity):
+        return 0.02 * np.tanh((angle / -100.0 + 0.3) / 0.25) ** 3
+
+    found = diagnose([rigid_record(12.0, extra=cable, seed=3)], scenario(tmp_path)).verdict
+    assert found.verdict == "unknown"
+    assert "unbalance" in found.suspects
+
+    def weight(angle, velocity):
+        return 0.02 * np.cos(angle / -100.0 + 0.4)
+
+    found = diagnose([rigid_record(12.0, extra=weight, seed=3)], scenario(tmp_path)).verdict
+    assert [effect.name for effect in found.effects] == ["unbalance"]
 
 
 def test_missing_friction_is_named_where_the_base_has_none(tmp_path):

@@ -31,6 +31,7 @@ from hdsim.effects.torsional_hysteresis_maxwell import SlipElement, TorsionalHys
 from hdsim.effects.unbalance import Unbalance
 from hdsim.effects.wave_generator_compliance import WaveGeneratorCompliance
 from hdsim.effects.wave_generator_eccentricity import WaveGeneratorEccentricity
+from hdsim.parts import Effect
 
 ARCMIN = math.radians(1 / 60)
 RATIO = -100.0
@@ -317,10 +318,17 @@ def test_cubic_spring_is_the_derivative_of_its_energy() -> None:
     assert at(model, TWIST=2e-3)[k.STORED] == pytest.approx(work)
 
 
-def wind_up(effect: FlexsplineStiffening | WaveGeneratorCompliance | BaseFlexibility, torque: float) -> float:
+def wind_up(effect: Effect, torque: float) -> float:
     build = FakeBuilder()
     effect.contribute(build)
     return float(build.compliances[0](np.array([torque]))[0])
+
+
+def test_a_gradual_play_is_taken_up_to_three_quarters_at_its_torque_and_never_beyond_its_width() -> None:
+    effect = OutputBacklash(backlash_arcmin=3, coefficient_per_nm=0.5)
+    assert wind_up(effect, 2.0) == pytest.approx(1.5 * ARCMIN * math.tanh(1.0))
+    assert wind_up(effect, -2.0) == -wind_up(effect, 2.0)
+    assert wind_up(effect, 200.0) == pytest.approx(1.5 * ARCMIN)
 
 
 def test_flexspline_wind_up_integrates_its_stiffness() -> None:

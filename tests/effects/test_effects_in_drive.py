@@ -26,3 +26,24 @@ def test_energy_audit_closes_with_every_effect_on(tmp_path: Path) -> None:
     assert np.all(np.diff(recording["heat"]) > -1e-9 * recording["heat"][-1])
     assert recording["temperature"][-1] > recording["temperature"][0]
     assert np.ptp(recording["bristle_deflection"]) > 0
+
+
+def test_a_play_that_is_taken_up_at_once_is_the_gap(tmp_path: Path) -> None:
+    # Two formulations of one thing: a spring in series that gives way at once, and a wider gap of the mesh.
+    torques = []
+    for play in ("{backlash_arcmin: 3}", "{backlash_arcmin: 3, coefficient_per_nm: 2000}"):
+        path = tmp_path / "locked.yaml"
+        path.write_text(
+            "drive: {preset: csg-20-100, mesh: {model: lumped}}\n"
+            "command:\n"
+            "  motor: {type: motion, trajectory: {type: sine, amplitude_deg: 12, frequency_hz: 0.5}}\n"
+            "  output: {type: locked}\n"
+            "load: {inertia_kg_m2: 0.1}\n"
+            f"effects: {{output_backlash: {play}}}\n"
+            "run: {duration_s: 2.0, sample_rate_hz: 200}\n",
+            encoding="utf-8",
+        )
+        torques.append(hdsim.simulate(hdsim.load_scenario(path))["output_torque"])
+    assert np.ptp(torques[0]) > 20
+    assert np.mean(np.abs(torques[0]) < 0.1) > 0.1  # the play
+    np.testing.assert_allclose(torques[1], torques[0], atol=2e-3 * np.max(np.abs(torques[0])))
