@@ -7,43 +7,17 @@ neither is a reason to call a model complete.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.measured import Array
+from hdsim.diagnose.verdict import Remainder
 
 #: Rest over the noise, root mean square, above which it isn't noise; below 1.25 where nothing is missing.
 EXCESS = 1.6
 #: Part of the rest's excess power that the stretch where it lives must hold.
 MOST = 0.8
-
-
-@dataclass(frozen=True)
-class Remainder:
-    """What is left of a channel.
-
-    Attributes:
-        record: name of the record.
-        channel: the channel.
-        ratio: root mean square of the rest over that of the noise, in the worst block.
-        start_s: begin of the stretch that holds most of it.
-        end_s: its end.
-        whole: the stretch is more than half of the record.
-    """
-
-    record: str
-    channel: str
-    ratio: float
-    start_s: float
-    end_s: float
-    whole: bool
-
-    def __str__(self) -> str:
-        when = "all over the record" if self.whole else f"between {self.start_s:.3g} and {self.end_s:.3g} s"
-        size = f"up to {self.ratio:.2g} times its noise"
-        return f"what is left of {self.channel} in {self.record} is {size}, {when}"
 
 
 def remainder(bench: Bench, predictions: Sequence[Array]) -> Remainder | None:
@@ -64,13 +38,15 @@ def remainder(bench: Bench, predictions: Sequence[Array]) -> Remainder | None:
         used = counts > 0
         powers = np.bincount(block, square)[used] / counts[used]
         ratio = float(np.sqrt(powers.max()))
-        if np.sqrt(square.mean()) < EXCESS or (worst is not None and worst.ratio > ratio):
+        if np.sqrt(square.mean()) < EXCESS or (worst is not None and worst.times_noise > ratio):
             continue
         beyond = np.maximum(powers - 1.0, 0.0)
         order = np.argsort(-beyond)
         needed = int(np.searchsorted(np.cumsum(beyond[order]), MOST * beyond.sum())) + 1
         inside = np.isin(block, np.flatnonzero(used)[order[:needed]])
         times = record.time[series.train][inside]
-        whole = float(np.ptp(times)) > 0.5 * record.duration_s
-        worst = Remainder(record.name, series.channel, ratio, float(times[0]), float(times[-1]), whole)
+        worst = Remainder(
+            record=record.name, channel=series.channel, times_noise=ratio,
+            start_s=float(times[0]), end_s=float(times[-1]),
+        )  # fmt: skip
     return worst

@@ -85,6 +85,21 @@ class Located(_Part):
     """Orders per wave-generator turn of its spectrum's peaks."""
 
 
+class Remainder(_Part):
+    """What is left of a channel, plainly more than noise, and lives in no coordinate that the data repeat."""
+
+    record: str
+    """Name of the record."""
+    channel: str
+    """Channel."""
+    times_noise: float
+    """Root mean square of the rest over that of the noise, in the worst block of time."""
+    start_s: float
+    """Begin of the stretch that holds most of it."""
+    end_s: float
+    """Its end."""
+
+
 class DataProblem(_Part):
     """Something wrong with the data."""
 
@@ -123,6 +138,8 @@ class Verdict(_Part):
     """Effects of the catalogue that could not be tried, with the reason."""
     curve: CurveFound | None = None
     """For ``unknown``: what is left as a curve over the coordinate that explains it best."""
+    remainder: Remainder | None = None
+    """For ``unknown``: what is left without a place, as what happens once."""
     next_experiment: NextExperiment | None = None
     """What to measure next, where these data leave names that they cannot tell apart."""
     scenario: str | None = None

@@ -74,6 +74,12 @@ class Sureness:
 
 def meaning(verdict: Verdict) -> str:
     """What a verdict means for the reader's model."""
+    if verdict.remainder is not None:
+        return (
+            "Something acts that the model does not have, perhaps once only: a shock, a slip, a stop that "
+            "the motion reached a single time. What does not repeat cannot be tested, so it gets no name; a "
+            "record in which it happens again would tell more."
+        )
     said = MEANINGS[verdict.verdict]
     if verdict.verdict == "unknown":
         said += (
@@ -185,6 +191,10 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
     last = search[-1].chance if search else 1.0
     if verdict.verdict == "effect":
         return _of_effects(verdict.effects)
+    if verdict.remainder is not None:
+        number = f"{verdict.remainder.times_noise:.2g} times the noise"
+        said = ["Noise alone leaves every stretch of a record at about its own level."]
+        return Sureness("Sure that something is missing, not what", number, tuple(said))
     if verdict.verdict == "unknown":
         chance = min(stage.location.chance for stage in diagnosis.stages)
         share = max(stage.location.structured for stage in diagnosis.stages)

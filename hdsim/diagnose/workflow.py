@@ -183,8 +183,11 @@ def diagnose(
     elif rest_of is not None:
         verdict = Verdict(
             verdict="unknown",
-            sentence=f"Something is missing that nothing in the catalogue explains: {rest_of}; "
-            "it is a function of no coordinate that these data repeat.",
+            sentence=f"Something is missing that nothing in the catalogue explains: {rest_of.channel} of "
+            f"{rest_of.record} is left with up to {rest_of.times_noise:.2g} times its noise, most of it "
+            f"between {rest_of.start_s:.3g} and {rest_of.end_s:.3g} s, and a function of no coordinate that "
+            "these data repeat.",
+            remainder=rest_of,
             **common,
         )
     elif named:

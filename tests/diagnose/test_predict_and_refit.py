@@ -5,7 +5,7 @@ import pytest
 from diagnose_bench import motion, rigid_record, scenario
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.freedom import Added, state_of
+from hdsim.diagnose.freedom import Added, base_freedoms, state_of
 from hdsim.diagnose.measured import Record
 from hdsim.diagnose.predict import Predictor, plan_for, predictors
 from hdsim.diagnose.refit import refit
@@ -88,6 +88,16 @@ def test_what_the_data_do_not_determine_stays_and_is_named(tmp_path):
     for interval in found.intervals:
         assert interval.value == interval.start
         assert math.isnan(interval.low)
+
+
+def test_a_locked_drive_tells_its_torque_constant_only_beside_a_second_torque(tmp_path):
+    # Its torque is the spring's: a factor on one is a factor on the other.
+    def free(*channels, locked):
+        return {each.name for each in base_freedoms(state_of(scenario(tmp_path)), channels, locked=locked)}
+
+    assert "motor_torque_gain" in free("motor_torque", locked=False)
+    assert "motor_torque_gain" in free("motor_torque", "output_torque", locked=True)
+    assert "motor_torque_gain" not in free("motor_torque", locked=True)
 
 
 @pytest.mark.parametrize("name", [name for name in catalogue() if name != "table"])
