@@ -280,6 +280,23 @@ class Bench:
             found.append(residual - residual[seen].mean())
         return found
 
+    def block_powers(self, predictions: Sequence[Array]) -> Array:
+        """Power of the whitened training residual in each block, shape (blocks,)."""
+        rest = self.stacked(self.residuals(predictions))
+        return np.asarray(np.bincount(self.stacked_blocks(), rest**2, self.blocks), dtype=float)
+
+    def power(self, predictions: Sequence[Array]) -> float:
+        """Power of the whitened training residual."""
+        return float(self.block_powers(predictions).sum())
+
+    def channel_powers(self, predictions: Sequence[Array]) -> dict[str, float]:
+        """Power of the whitened training residual in each channel."""
+        found = dict.fromkeys(self.channels, 0.0)
+        for series, residual in zip(self.series, self.residuals(predictions), strict=True):
+            if series.record < self.training:
+                found[series.channel] += float(np.sum((residual[series.train] / series.sigma) ** 2))
+        return found
+
     def weigh(self, residuals: Sequence[Array]) -> None:
         """Set every series' ``sigma`` from its noise and from what is left of it."""
         for series, residual in zip(self.series, residuals, strict=True):

@@ -132,7 +132,10 @@ class Vector:
         bounds = np.where(self._stiff(), -math.expm1(3.0), -3.0).tolist()
         for added in self.base.added[self.first :]:
             bounds += [-math.inf if s else 0.0 for s in signed(added.fitting, len(added.orders))]
-            bounds += [math.log(shape) - 3.0 for shape in added.shapes]
+            bounds += [
+                max(math.log(value) - 3.0, math.log(shape.least) if shape.least > 0 else -math.inf)
+                for value, shape in zip(added.shapes, added.fitting.shapes, strict=True)
+            ]
         return np.array(bounds)
 
     def upper(self) -> Array:

@@ -22,8 +22,6 @@ from hdsim.diagnose.name import (
     LEVEL,
     SAME,
     Named,
-    block_losses,
-    channel_powers,
     confusable,
     name_effect,
 )
@@ -119,7 +117,7 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
 
 def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
     """Whether more than noise is left in some channel, enough for one more effect to matter."""
-    first, last = (channel_powers(bench, each.predictions) for each in (base, now))
+    first, last = (bench.channel_powers(each.predictions) for each in (base, now))
     noise = bench.noise_powers
     return any(last[c] - noise[c] >= LATER_SHARE * first[c] for c in first)
 
@@ -132,7 +130,7 @@ def _matters(bench: Bench, base: Fit, before: Fit, new: Named, others: list[Name
         for other in others
     )
     least = LATER_ALIKE if alike else LATER_SHARE
-    first, last, now = (channel_powers(bench, each.predictions) for each in (base, before, new.fit))
+    first, last, now = (bench.channel_powers(each.predictions) for each in (base, before, new.fit))
     return not others or max(last[c] - now[c] - least * first[c] for c in first) >= 0
 
 
@@ -151,10 +149,10 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
 
     The last one was asked beside the others, and is so again only where they have changed since.
     """
-    first = _loss(bench, current)
+    first = bench.power(current.predictions)
     k = 0
     while k < len(found.named):
-        if k == len(found.named) - 1 and _loss(bench, current) > (1.0 - NEWS) * first:
+        if k == len(found.named) - 1 and bench.power(current.predictions) > (1.0 - NEWS) * first:
             break
         own = found.named[k]
         added = list(current.state.added)
@@ -180,7 +178,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             found.named.pop(k)
             current = without
             continue
-        loss, now = _loss(bench, current), _loss(bench, named.fit)
+        loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
         same = named.name == own.name or own.name in named.group
         if same or now < (1.0 - SAME) * loss:
             own = named if named.name == own.name or not same else own
@@ -195,10 +193,6 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             found.named[k] = own
         k += 1
     return current
-
-
-def _loss(bench: Bench, found: Fit) -> float:
-    return float(block_losses(bench, found.predictions).sum())
 
 
 def left_of(bench: Bench, current: Fit) -> Residual:

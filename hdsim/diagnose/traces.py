@@ -173,7 +173,10 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
     if any(isinstance(t, Amplitude) and t.of_range and t.of_range not in ranges for t in fitting.terms):
         return []
     shapes = [
-        replace(s, starts=tuple(v / ranges[s.over_range] for v in s.starts), over_range="")
+        replace(
+            s, starts=tuple(v / ranges[s.over_range] for v in s.starts),
+            least=s.least / ranges[s.over_range], over_range="",
+        )
         if s.over_range else s
         for s in fitting.shapes
     ]  # fmt: skip

@@ -17,7 +17,7 @@ from hdsim.diagnose.fit import Fit, added_spreads, base_intervals
 from hdsim.diagnose.freedom import Interval, State, state_of
 from hdsim.diagnose.locate import Location
 from hdsim.diagnose.measured import Array, Record, record_from
-from hdsim.diagnose.name import LEVEL, Named, block_losses
+from hdsim.diagnose.name import LEVEL, Named
 from hdsim.diagnose.predict import LoadSource, PredictionError, predictors
 from hdsim.diagnose.prove import gaps
 from hdsim.diagnose.refit import Refit, refit
@@ -131,9 +131,7 @@ def diagnose(
     with running:
         found = search(bench, base.fit, during)
     current, stages, named, left = found.fit, found.stages, found.named, found.left
-    explained = float(
-        (block_losses(bench, base.fit.predictions) - block_losses(bench, current.predictions)).sum()
-    )
+    explained = bench.power(base.fit.predictions) - bench.power(current.predictions)
     last = stages[-1].location
     rest = last.structured * left.power
     explained /= max(explained + rest, 1e-300)

@@ -81,12 +81,14 @@ class Shape:
         over_range: the starts are divided by the largest value that the record has of this: ``torque_nm`` at
             the output, or ``motor_side_torque_nm``, if any.
         linear: the field is an angle or the like, whose neighbours lie at differences, not at ratios.
+        least: what lies below is another effect's; divided like the starts.
     """
 
     path: str
     starts: tuple[float, ...]
     over_range: str = ""
     linear: bool = False
+    least: float = 0.0
 
     def neighbours(self, value: float, times: int) -> tuple[float, float]:
         """Values on both sides at the half of the starts' distance, halved ``times`` times.
@@ -100,7 +102,7 @@ class Shape:
             gap = part * (self.starts[1] - self.starts[0])
             return value - gap, value + gap
         ratio = self.starts[1] / self.starts[0] if len(self.starts) > 1 else ALONE
-        return float(value / ratio**part), float(value * ratio**part)
+        return max(float(value / ratio**part), self.least), float(value * ratio**part)
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,8 @@ class OutputBacklash(Effect):
         *(
             Fitting(
                 (Amplitude({"backlash_arcmin": part}, of_range="twist_arcmin", play=True),),
-                (Shape("coefficient_per_nm", (5.0, 30.0), "torque_nm"),),
+                # Taken up later than within a seventh of the torque it would be any compliance that stiffens.
+                (Shape("coefficient_per_nm", (8.0, 32.0), "torque_nm", least=7.0),),
                 label="taken up gradually",
             )
             for part in _PARTS[1:]

@@ -14,7 +14,6 @@ from hdsim.diagnose.experiments import Limits, experiments
 from hdsim.diagnose.fit import Fit, fit
 from hdsim.diagnose.freedom import Added, signed, state_of
 from hdsim.diagnose.measured import Record
-from hdsim.diagnose.name import block_losses
 from hdsim.diagnose.predict import predictors
 from hdsim.diagnose.refit import refit
 from hdsim.effects import catalogue
@@ -80,7 +79,7 @@ def losses(bench: Bench, fits: dict[str, Fit], turned_deg: float) -> dict[str, f
             state = replace(state, added=(replace(state.added[0], coefficients=c),))
         bench.weigh([np.zeros(len(s.measured)) for s in bench.series])
         again = fit(bench, state, one.frees, held_effects=1, prune=False, evaluations=4)
-        found[name] = float(block_losses(bench, again.predictions).sum())
+        found[name] = bench.power(again.predictions)
     return found
 
 
