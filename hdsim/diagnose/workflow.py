@@ -34,8 +34,10 @@ if TYPE_CHECKING:
     from hdsim.scenario import Scenario
 
 #: Share of the weighed residual that must be structured for ``unknown``, and the part of all structure that
-#: the named effects must explain to be believed; the same share in the own coordinate of an exact law.
-STRUCTURED, ADEQUATE, OWN = 0.12, 0.95, 0.05
+#: the named effects must explain to be believed; more where they leave most in their own coordinate.
+STRUCTURED, ADEQUATE, OWN_ADEQUATE = 0.12, 0.9, 0.95
+#: The first of these in the own coordinate of an exact law.
+EXACTLY = 0.05
 #: Least relative fall of a held-out gap for the verdict ``parameter``.
 LEAST_FALL = 0.03
 
@@ -135,9 +137,7 @@ def diagnose(
     last = stages[-1].location
     rest = last.structured * left.power
     explained /= max(explained + rest, 1e-300)
-    misfit = last.structured > STRUCTURED and explained < ADEQUATE
-    misfit |= last.structured > OWN and any(_off_its_law(one, last) for one in named)
-    unknown = last.chance <= LEVEL and misfit
+    unknown = last.chance <= LEVEL and _misfit(named, last, explained)
     rest_of = None if named or unknown else remainder(bench, current.predictions)
     curve: CurveFit | None = None
     if unknown:
@@ -212,10 +212,23 @@ def diagnose(
     return Diagnosis(verdict, checks, bench, base, stages, named, current, start, explained, predictions)
 
 
-def _off_its_law(one: Named, last: Location) -> bool:
-    """Whether an effect with an exact law leaves most in its own coordinate."""
-    signature = catalogue()[one.name].signature
-    return signature.exact and last.places[0].coordinate == signature.lives_in[0]
+def _misfit(named: Sequence[Named], last: Location, explained: float) -> bool:
+    """Whether the names explain too little to be believed.
+
+    Args:
+        named: the named effects.
+        last: where what they leave lives.
+        explained: part of all structure that they explain.
+    """
+    needed = ADEQUATE
+    place = last.places[0]
+    for one in named:
+        signature = catalogue()[one.name].signature
+        if place.coordinate == signature.lives_in[0] and place.channel in signature.channels:
+            needed = OWN_ADEQUATE
+            if signature.exact:
+                return last.structured > EXACTLY
+    return last.structured > STRUCTURED and explained < needed
 
 
 def _proved(gap: Mapping[str, Gap]) -> bool:
