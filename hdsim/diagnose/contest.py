@@ -19,7 +19,6 @@ from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, designs
-from hdsim.effects._fitting import Inverse
 
 #: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
 #: be fitted further, and from the numbers as given.
@@ -153,7 +152,7 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
     square = point.columns.T @ point.columns + np.diag([power / free.prior**2 for free in frees])
     moves = np.linalg.solve(square, point.columns.T @ (point.left - columns @ coefficients))
     stiff = np.array(["stiffness" in free.name for free in frees], dtype=bool)
-    series = any(isinstance(term, Inverse) for term in added.fitting.terms)
+    series = added.fitting.in_series
     if series:
         # Beside a compliance it is the drive's own compliance, not its stiffness, that moves in proportion.
         moves = np.where(stiff, -np.log1p(-np.clip(moves, None, SOFTEST)), moves)
@@ -199,8 +198,3 @@ def _fully(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
 def _power(bench: Bench, rest: Array) -> float:
     """What one independent sample of a residual counts."""
     return max(float(np.mean(rest**2)), 1e-30) * correlation(rest, bench.stacked_blocks())
-
-
-def in_series(one: Screened) -> bool:
-    """Whether an effect is a compliance in series."""
-    return any(isinstance(term, Inverse) for term in one.added.fitting.terms)

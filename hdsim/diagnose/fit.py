@@ -21,7 +21,6 @@ from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.freedom import Added, Free, Interval, State, ceilings, scaled, signed
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import PredictionError
-from hdsim.effects._fitting import Inverse
 
 #: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which
 #: the model is further from linear; change of the whitened predictions, root mean square, for which a smaller
@@ -199,7 +198,7 @@ def fit(
     if prune and chosen:
         chosen, undetermined, ties, known = _determined(bench, state, chosen, held_effects, blocks, theta)
         power = known[1]
-    series = any(isinstance(t, Inverse) for added in state.added[held_effects:] for t in added.fitting.terms)
+    series = any(added.fitting.in_series for added in state.added[held_effects:])
     vector = Vector(state, tuple(chosen), held_effects, series)
     lower, upper = vector.lower(), vector.upper()
     x0 = np.clip(vector.start(theta), np.where(np.isfinite(lower), lower + 1e-3, lower), upper)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.contest import contest, in_series
+from hdsim.diagnose.contest import contest
 from hdsim.diagnose.fit import Fit, settled
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.screen import Residual
@@ -93,9 +93,9 @@ def name_effect(
     softer = any(
         "stiffness" in free.name and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True)
     )
-    if softer and any(in_series(one) for one in shortlist):
+    if softer and any(one.added.fitting.in_series for one in shortlist):
         # The re-fit may have taken any compliance in series for the drive's own.
-        shortlist += [one for one in screening.ranked if in_series(one) and one not in shortlist]
+        shortlist += [one for one in screening.ranked if one.added.fitting.in_series and one not in shortlist]
     before = bench.block_powers(base.predictions)
     with bench.coarse():
         results = contest(bench, base, shortlist, residual, on_step)

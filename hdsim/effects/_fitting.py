@@ -130,6 +130,11 @@ class Fitting:
     cumulative: bool = False
 
     @property
+    def in_series(self) -> bool:
+        """Whether it fits a compliance in series with the drive's spring."""
+        return any(isinstance(term, Inverse) for term in self.terms)
+
+    @property
     def play(self) -> bool:
         """Whether it fits the width of a play."""
         return any(isinstance(term, Amplitude) and term.play for term in self.terms)
