@@ -36,8 +36,8 @@ def scenario_text(base: Path, state: State, freedoms: Sequence[Free], start: Sta
     }
     for free in freedoms:
         for path in free.paths:
-            if path == "gain":
-                continue
+            if path == "gain" or free.step:
+                continue  # the log's, not the model's; the gain is written as a sensor's below
             new, old = number_at(state, path), number_at(start, path)
             if new is not None and old is not None and new != old:
                 put(data, path, _rounded(new))

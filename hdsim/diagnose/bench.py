@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hdsim.diagnose.check import noise_floor
 from hdsim.diagnose.measured import Array, Mask
-from hdsim.diagnose.predict import COARSE_RTOL, Candidate, PredictionError, Predictor
+from hdsim.diagnose.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ class Bench:
             there = predictor.predict(candidate)
             predictor.turn(-step)
             changed = [
-                state.gain * there[s.channel] if s.channel == "motor_torque" else there[s.channel]
+                state.reading(s.channel, predictor.record.time, there[s.channel])
                 for s in self.series
                 if s.record == index
             ]
@@ -215,24 +215,35 @@ class Bench:
             widest = max(widest, float(np.degrees(high - low)) * 60.0)
         return {"twist_arcmin": widest} if widest > 0 else {}
 
-    def predict(self, candidate: Candidate, gain: float = 1.0, *, everything: bool = False) -> list[Array]:
-        """Predictions of all series; of records that are held out only when ``everything``.
+    def predict(self, state: State, *, everything: bool = False) -> list[Array]:
+        """What the log would show of all series; of records that are held out only when ``everything``.
 
         Args:
-            candidate: the model.
-            gain: sensitivity of the motor torque's reading.
+            state: the model.
             everything: predict the held-out records too.
+
+        Raises:
+            PredictionError: the model could not be predicted.
         """
         reach = len(self.predictors) if everything else self.training
+        candidate = state.candidate()
         found: list[Mapping[str, Array]] = [p.predict(candidate) for p in self.predictors[:reach]]
-        predictions = []
-        for series in self.series:
-            if series.record >= reach:
-                predictions.append(np.zeros(0))
-                continue
-            values = found[series.record][series.channel]
-            predictions.append(gain * values if series.channel == "motor_torque" else values)
-        return predictions
+        return [
+            state.reading(s.channel, self._time(s), found[s.record][s.channel])
+            if s.record < reach
+            else np.zeros(0)
+            for s in self.series
+        ]
+
+    def reread(self, predictions: Sequence[Array], before: State, now: State) -> list[Array]:
+        """Predictions of a state that differs from ``before`` in the readings' gain and delays only."""
+        return [
+            now.reading(s.channel, self._time(s), values, before) if len(values) else values
+            for s, values in zip(self.series, predictions, strict=True)
+        ]
+
+    def _time(self, series: Series) -> Array:
+        return self.predictors[series.record].record.time
 
     @contextlib.contextmanager
     def coarse(self) -> Iterator[None]:
@@ -259,7 +270,7 @@ class Bench:
 
         def one(state: State) -> list[Array] | None:
             try:
-                return self.predict(state.candidate(), state.gain)
+                return self.predict(state)
             except PredictionError:
                 return None
 

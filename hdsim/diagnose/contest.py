@@ -58,12 +58,10 @@ def _as_given(bench: Bench, base: Fit) -> _Point:
     """The base at its numbers before they were fitted."""
     frees = at_present(base)
     state = scaled(base.state, frees, (-base.theta).tolist())
-    there = [
-        replace(free, value=free.value * math.exp(-t)) for free, t in zip(frees, base.theta, strict=True)
-    ]
+    there = [replace(free, value=free.at(-t)) for free, t in zip(frees, base.theta, strict=True)]
     # All effects are held there.
     vector = Vector(state, tuple(there), len(state.added))
-    predictions = bench.predict(state.candidate(), state.gain)
+    predictions = bench.predict(state)
     return _Point(
         -base.theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
         bench.stacked(bench.residuals(predictions)),
@@ -124,7 +122,8 @@ def _from_given(bench: Bench, base: Fit, given: _Point, added: Added) -> list[Fi
     (columns,) = designs(bench, given.state, given.predictions, [added])
     if columns is None:
         return []
-    both = np.hstack([given.columns, columns])
+    # Delays stay where they are: nothing bounds them here.
+    both = np.hstack([given.columns * np.array([not free.step for free in base.frees]), columns])
     found, *_ = np.linalg.lstsq(both, given.left, rcond=1e-6)
     free = signed(added.fitting, len(added.orders))
     coefficients = np.where(

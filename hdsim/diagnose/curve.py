@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.bench import Bench, Series
 from hdsim.diagnose.fit import COEFFICIENT_PRIOR, Fit
 from hdsim.diagnose.freedom import Added, State, scaled
 from hdsim.diagnose.further import CurveFound
@@ -264,7 +264,8 @@ def corners(
     )
     columns = hats(x[rows], fine)
     if kind.times_direction:
-        columns = columns * _signs(bench)[rows][:, None]
+        sign = np.concatenate([_sign(bench, s)[s.train] for s in bench.series if s.record < bench.training])
+        columns = columns * sign[rows][:, None]
     smooth = penalised(columns, left.values[rows], blocks[rows], roughness(FINE))
     bend = np.abs(np.diff(smooth.values, 2))
     density = np.sqrt(np.concatenate([bend[:1], bend, bend[-1:]]))
@@ -284,16 +285,10 @@ _PLACES: dict[Coordinate, str] = {
 }
 
 
-def _signs(bench: Bench) -> Array:
-    """Smoothed sign of the motor's speed in every row of ``Bench.stacked``."""
+def _sign(bench: Bench, series: Series) -> Array:
+    """Smoothed sign of the motor's speed at all samples of a series, shape (n,)."""
     smoothing = TableCurve.model_fields["smoothing_velocity_rad_per_s"].default
-    return np.concatenate(
-        [
-            np.tanh(bench.predictors[s.record].motor_velocity[s.train] / smoothing)
-            for s in bench.series
-            if s.record < bench.training
-        ]
-    )
+    return np.asarray(np.tanh(bench.predictors[series.record].motor_velocity / smoothing))
 
 
 def _unit(state: State, kind: Kind) -> float:
@@ -325,7 +320,6 @@ def unit_traces(
     """
     unit = _unit(fit.state, kind)
     if kind.acts_on == "motor_torque":
-        sign = _signs(bench) if kind.times_direction else None
         whole = np.zeros((len(bench.stacked_series()), len(at)))
         row = 0
         for k, series in enumerate(bench.series):
@@ -336,10 +330,11 @@ def unit_traces(
                 x = _values(bench, fit.state, kind, k, residuals)
                 if x is None:
                     return None
-                basis = _basis(at, kind.period, x[series.train])
-                if sign is not None:
-                    basis = basis * sign[row : row + count, None]
-                change = -unit * fit.state.gain * basis
+                basis = -unit * _basis(at, kind.period, x)
+                if kind.times_direction:
+                    basis *= _sign(bench, series)[:, None]
+                time = bench.predictors[series.record].record.time
+                change = fit.state.reading(series.channel, time, basis)[series.train]
                 whole[row : row + count] = (change - change.mean(axis=0)) / series.sigma
             row += count
         return whole
@@ -389,7 +384,8 @@ def _solved(
     rest = bench.stacked(bench.residuals(fit.predictions))
     numbers = bench.stacked_series()
     offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
-    own = fit.columns[:, : len(fit.frees)]
+    # Delays stay where they are: nothing bounds them here.
+    own = fit.columns[:, : len(fit.frees)] * np.array([not free.step for free in fit.frees])
     for _ in range(2):
         step = found.inverse @ (right - found.penalty @ coefficients)
         coefficients = coefficients + step
@@ -404,7 +400,7 @@ def _solved(
         state = replace(
             state, added=(*state.added, replace(added, coefficients=tuple(coefficients.tolist())))
         )
-        predictions = bench.predict(state.candidate(), state.gain)
+        predictions = bench.predict(state)
         rest = bench.stacked(bench.residuals(predictions))
         loss = float(rest @ rest)
         if chosen is not None and loss >= chosen[0]:

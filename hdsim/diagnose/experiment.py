@@ -293,7 +293,7 @@ def _simulated(
             continue
         source = f"measured_{channel}" if f"measured_{channel}" in got else channel
         values = np.asarray(got[source])[later]
-        found[channel] = state.gain * values if channel == "motor_torque" else values
+        found[channel] = state.reading(channel, np.asarray(got.time)[later], values)
     return found
 
 

@@ -56,7 +56,7 @@ def gap_bars(diagnosis: Diagnosis) -> dict[str, Bars]:
             state = stage.named.fit.state if stage.named is not None else None
             if state is None or len(state.added) >= len(verdict.effects):
                 continue
-            residuals = bench.residuals(bench.predict(state.candidate(), state.gain, everything=True))
+            residuals = bench.residuals(bench.predict(state, everything=True))
             label = "with " + ", ".join(spoken(added.effect) for added in state.added)
             for channel, bars in found.items():
                 value, interval = held_out_gap(bench, channel, residuals, np.random.default_rng(17))

@@ -35,6 +35,8 @@ EVALUATIONS = 8
 #: Relative fall of the cost at which a round of a fit ends; rounds, and promised fall, in units of what one
 #: independent sample adds to the cost, at which no further one begins.
 ROUGHLY, ROUNDS, TIGHT = 3e-4, 2, 0.25
+#: Least degrees of freedom of an interval: with fewer nobody can say what a spread is.
+FEWEST_DEGREES = 3.0
 #: Part of a step's change that a Jacobian may get wrong and still be corrected instead of made anew, and of
 #: the residual that it may get wrong and stay as it is.
 FORETOLD, NEGLIGIBLE = 0.3, 0.01
@@ -128,7 +130,7 @@ class Vector:
 
     def lower(self) -> Array:
         """Lower bounds, shape (p,)."""
-        bounds = np.where(self._stiff(), -math.expm1(3.0), -3.0).tolist()
+        bounds = np.where(self._stiff(), -math.expm1(3.0), [f.none - 3.0 for f in self.frees]).tolist()
         for added in self.base.added[self.first :]:
             bounds += [-math.inf if s else 0.0 for s in signed(added.fitting, len(added.orders))]
             bounds += [
@@ -139,7 +141,7 @@ class Vector:
 
     def upper(self) -> Array:
         """Upper bounds, shape (p,)."""
-        bounds = np.where(self._stiff(), -math.expm1(-3.0), 3.0).tolist()
+        bounds = np.where(self._stiff(), -math.expm1(-3.0), [f.none + 3.0 for f in self.frees]).tolist()
         for added in self.base.added[self.first :]:
             bounds += ceilings(added)
             bounds += [math.log(shape) + 3.0 for shape in added.shapes]
@@ -203,7 +205,7 @@ def fit(
     lower, upper = vector.lower(), vector.upper()
     x0 = np.clip(vector.start(theta), np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
     first = vector.state(x0)
-    predictions = bench.predict(first.candidate(), first.gain)
+    predictions = bench.predict(first)
     start = _stacked(bench, predictions)
     if len(x0) == 0:
         empty = np.zeros((len(start), 0))
@@ -211,7 +213,7 @@ def fit(
     if math.isnan(power):
         power = correlation(start, blocks) * max(float(np.mean(start**2)), 1e-30)
     worth = 1.0 / math.sqrt(power)
-    priors, centre = vector.priors(), vector.start()
+    priors, centre = vector.priors(), vector.start({free.name: free.none for free in chosen})
     centre[len(chosen) :] = np.where(
         np.isfinite(lower[len(chosen) :]) & (priors[len(chosen) :] == SHAPE_PRIOR), x0[len(chosen) :], 0.0
     )
@@ -227,7 +229,7 @@ def fit(
         if rest is None:
             try:
                 moved = vector.state(x)
-                there = bench.predict(moved.candidate(), moved.gain)
+                there = bench.predict(moved)
                 rest = _stacked(bench, there)
                 slopes.seen(x, there, rest)
             except PredictionError:
@@ -340,10 +342,7 @@ def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
 
 def at_present(found: Fit) -> list[Free]:
     """A fit's free numbers at their fitted values."""
-    return [
-        replace(free, value=free.value * float(np.exp(t)))
-        for free, t in zip(found.frees, found.theta, strict=True)
-    ]
+    return [replace(free, value=free.at(float(t))) for free, t in zip(found.frees, found.theta, strict=True)]
 
 
 def sensitivities(
@@ -366,26 +365,29 @@ def sensitivities(
         like: sensitivities near ``x``, shape (rows, up to p): steps are then large enough for a change that
             stands out from the solver's noise, and no larger.
     """
-    states = [] if predictions is not None else [vector.state(x)]
+    here = vector.state(x)
+    if predictions is None:
+        predictions = bench.predict(here)
     steps = vector.steps(x)
     if like is not None:
         size = np.sqrt(np.mean(like**2, axis=0))
         steps[: len(size)] *= np.clip(CHANGE / np.maximum(size * steps[: len(size)], 1e-300), LEAST_STEP, 1.0)
     steps = steps[first:]
+    states = []
     for k, step in enumerate(steps, start=first):
         shifted = x.copy()
         shifted[k] += step
         states.append(vector.state(shifted))
-    rest = bench.predict_all(states)
-    base = rest.pop(0) if predictions is None else predictions
+    # How a channel is read needs no simulation.
+    read = [first <= k < len(vector.frees) and vector.frees[k].reading for k in range(first, len(x))]
+    simulated = iter(bench.predict_all([s for s, only in zip(states, read, strict=True) if not only]))
     rows = len(bench.stacked_blocks())
-    if base is None or not rest:
-        return np.zeros((rows, len(rest)))
-    columns = [
-        np.zeros(rows) if there is None else bench.trace(base, there) / step
-        for there, step in zip(rest, steps, strict=True)
-    ]
-    return np.column_stack(columns)
+    columns = np.zeros((rows, len(steps)))
+    for k, (state, only, step) in enumerate(zip(states, read, steps, strict=True)):
+        there = bench.reread(predictions, here, state) if only else next(simulated)
+        if there is not None:
+            columns[:, k] = bench.trace(predictions, there) / step
+    return columns
 
 
 def _stacked(bench: Bench, predictions: Sequence[Array]) -> Array:
@@ -413,6 +415,10 @@ def robust_covariance(
 ) -> Array:
     """Covariance of the free numbers, shape (p, p): how they move when one block of time is left out.
 
+    It is scaled so that two standard deviations are a 95 % interval: for each number Student's t with one
+    degree of freedom less than the blocks that tell of it (their effective number, Carter, Schnepel and
+    Steigerwald 2017, Review of Economics and Statistics 99:698), over 2.
+
     Args:
         columns: sensitivities to the free numbers, shape (rows, p).
         rest: what the fit leaves, shape (rows,).
@@ -425,23 +431,30 @@ def robust_covariance(
             np.hstack([columns, beside[0]]), rest, blocks, np.concatenate([priors, beside[1]])
         )
         return whole[: len(priors), : len(priors)]
+    from scipy.stats import t as student_t
+
     power = max(float(np.mean(rest**2)), 1e-30)
     # The prior keeps a direction that the data say nothing about from having no spread at all.
     information = columns.T @ columns + np.diag(power / priors**2)
     bread = np.linalg.inv(information)
     order = np.argsort(blocks, kind="stable")
     ends = np.flatnonzero(np.diff(blocks[order])) + 1
-    moves = []
+    moves, parts = [], []
     for rows in np.split(order, ends):
         own = columns[rows]
-        moves.append(np.linalg.solve(information - own.T @ own, own.T @ rest[rows]))
-    away = np.array(moves)
+        square = own.T @ own
+        without = np.linalg.inv(information - square)
+        moves.append(without @ (own.T @ rest[rows]))
+        parts.append(np.einsum("ij,jk,ik->i", without, square, without))
+    away, variances = np.array(moves), np.array(parts)
     clustered = away.T @ away * (len(away) - 1) / len(away)
     clustered += bread @ np.diag(power**2 / priors**2) @ bread
     # Few blocks can make the clustered spread too small by chance: white noise is its least.
     white = power * bread
     low = np.maximum(1.0, np.sqrt(np.diag(white) / np.maximum(np.diag(clustered), 1e-300)))
-    return np.asarray(clustered * np.outer(low, low))
+    telling = variances.sum(axis=0) ** 2 / np.maximum((variances**2).sum(axis=0), 1e-300)
+    scale = low * student_t.ppf(0.975, np.maximum(telling - 1.0, FEWEST_DEGREES)) / 2.0
+    return np.asarray(clustered * np.outer(scale, scale))
 
 
 def _determined(
@@ -463,7 +476,7 @@ def _determined(
     vector = Vector(state, tuple(frees), held_effects)
     x0 = vector.start(theta)
     first = vector.state(x0)
-    predictions = bench.predict(first.candidate(), first.gain)
+    predictions = bench.predict(first)
     columns = sensitivities(bench, vector, x0, predictions)
     rest = _stacked(bench, predictions)
     # What one step of the fit takes away is no noise, however far off the start is.
@@ -505,18 +518,9 @@ def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
     first = {free.name: free.value for free in starts}
     intervals = []
     for k, free in enumerate(found.frees):
-        value = free.value * math.exp(found.theta[k])
-        spread = 2.0 * math.sqrt(found.covariance[k, k])
-        intervals.append(
-            Interval(
-                free.name,
-                value,
-                first.get(free.name, free.value),
-                value * math.exp(-spread),
-                value * math.exp(spread),
-                free.unit,
-            )
-        )
+        now, spread = float(found.theta[k]), 2.0 * math.sqrt(found.covariance[k, k])
+        value, low, high = free.at(now), free.at(now - spread), free.at(now + spread)
+        intervals.append(Interval(free.name, value, first.get(free.name, free.value), low, high, free.unit))
     for free in found.undetermined:
         start = first.get(free.name, free.value)
         intervals.append(

@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from hdsim.diagnose.measured import Array
 from hdsim.diagnose.predict import LEAD_IN_S, Candidate, PredictionError
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Inverse, Periodic
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Coefficient below which a compliance in series counts as none.
 STIFF = 1e-6
+#: Prior standard deviation of a torque's delay beside the motion, samples.
+DELAY_PRIOR = 1.0
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class Free:
         prior: standard deviation of theta that an engineer would believe before the measurement.
         value: the start value, of the first path.
         unit: of the value.
+        step: where it is not 0, the value is the start plus theta times this: it may be negative.
     """
 
     name: str
@@ -38,6 +43,21 @@ class Free:
     prior: float
     value: float
     unit: str = ""
+    step: float = 0.0
+
+    @property
+    def reading(self) -> bool:
+        """Whether it changes how a channel is read, not what happens."""
+        return self.paths == ("gain",) or bool(self.step)
+
+    @property
+    def none(self) -> float:
+        """Where a prior's centre is: theta of the start, or of no delay."""
+        return -self.value / self.step if self.step else 0.0
+
+    def at(self, theta: float) -> float:
+        """The value at ``theta``."""
+        return self.value + self.step * theta if self.step else self.value * math.exp(theta)
 
 
 @dataclass(frozen=True)
@@ -138,6 +158,7 @@ class State:
         added: effects that the diagnosis has added.
         gain: sensitivity of the motor torque's reading.
         seed: seed of the model.
+        delays: age of the torques' readings beside that of the motion's, s, by channel.
     """
 
     drive: Any
@@ -146,6 +167,25 @@ class State:
     added: tuple[Added, ...] = ()
     gain: float = 1.0
     seed: int = 0
+    delays: Mapping[str, float] = field(default_factory=dict)
+
+    def reading(self, channel: str, time: Array, values: Array, before: State | None = None) -> Array:
+        """What the log shows of a predicted channel.
+
+        Args:
+            channel: its name.
+            time: shape (n,), s.
+            values: the prediction, shape (n,); or the reading under the state ``before``.
+            before: a state that differs in gain and delays only.
+        """
+        delay, gain = self.delays.get(channel, 0.0), self.gain
+        if before is not None:
+            delay, gain = delay - before.delays.get(channel, 0.0), gain / before.gain
+        if delay:
+            from scipy.interpolate import CubicSpline
+
+            values = CubicSpline(time, values)(np.clip(time - delay, time[0], time[-1]))
+        return gain * values if channel == "motor_torque" else values
 
     def candidate(self) -> Candidate:
         """The model to predict with.
@@ -190,7 +230,12 @@ _PRIORS = {
 
 
 def base_freedoms(
-    state: State, channels: Sequence[str], *, load_known: bool = False, locked: bool = False
+    state: State,
+    channels: Sequence[str],
+    *,
+    load_known: bool = False,
+    locked: bool = False,
+    period_s: float = 0.0,
 ) -> list[Free]:
     """Numbers that the model has and that a fit may move: the zero ones stay zero.
 
@@ -200,6 +245,7 @@ def base_freedoms(
         load_known: the output's torque is measured and given, so nothing of the load is free.
         locked: the output does not move: then only a second torque tells the sensitivity of the motor's from
             the drive's own stiffness and friction.
+        period_s: of the samples: torques may be stamped late or early by some of them; 0: they are not.
     """
     drive, load = state.drive, state.load
     found = [_free("drive.inertia.motor_kg_m2", drive.inertia.motor_kg_m2, "kg m^2")]
@@ -226,7 +272,13 @@ def base_freedoms(
                 found.append(Free(path, (path,), 0.7, value, field_name.rpartition("_nm")[1].strip("_")))
     if "motor_torque" in channels and ("output_torque" in channels or not locked):
         found.append(Free("motor_torque_gain", ("gain",), 0.15, state.gain, "1"))
-    return [free for free in found if free.value > 0]
+    found = [free for free in found if free.value > 0]
+    for channel in ("motor_torque", *(("output_torque",) if not load_known else ())):
+        if channel in channels and period_s:
+            now = state.delays.get(channel, 0.0)
+            path = f"{channel}_delay_s"
+            found.append(Free(path, (path,), DELAY_PRIOR, now, "s", period_s))
+    return found
 
 
 def _free(path: str, value: float, unit: str) -> Free:
@@ -234,9 +286,14 @@ def _free(path: str, value: float, unit: str) -> Free:
 
 
 def scaled(state: State, frees: Sequence[Free], theta: Sequence[float]) -> State:
-    """``state`` with every freedom's numbers multiplied by exp(theta)."""
+    """``state`` with every freedom's numbers multiplied by exp(theta), delays moved by their steps."""
     drive, load, effects, gain = state.drive, state.load, dict(state.effects), state.gain
+    delays = dict(state.delays)
     for free, t in zip(frees, theta, strict=True):
+        if free.step:
+            channel = free.name.removesuffix("_delay_s")
+            delays[channel] = delays.get(channel, 0.0) + free.step * float(t)
+            continue
         factor = math.exp(float(t))
         for path in free.paths:
             section, _, rest = path.partition(".")
@@ -249,7 +306,7 @@ def scaled(state: State, frees: Sequence[Free], theta: Sequence[float]) -> State
             else:
                 name, _, field_name = rest.partition(".")
                 effects[name] = _multiplied(effects[name], field_name, factor)
-    return State(drive, load, effects, state.added, gain, state.seed)
+    return State(drive, load, effects, state.added, gain, state.seed, delays)
 
 
 def _multiplied(model: BaseModel, path: str, factor: float) -> Any:
@@ -322,6 +379,6 @@ class Interval:
 
     @property
     def moved(self) -> bool:
-        """Whether the start value lies outside the interval and more than 3 % away."""
-        away = abs(self.value - self.start) > 0.03 * abs(self.start)
+        """Whether the start value lies outside the interval and more than 3 % away; a delay is no model's."""
+        away = self.start != 0.0 and abs(self.value - self.start) > 0.03 * abs(self.start)
         return self.determined and away and not self.low <= self.start <= self.high

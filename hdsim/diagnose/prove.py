@@ -22,10 +22,7 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
         bench: the measured series with their held-out parts.
         states: the three models.
     """
-    predictions = {
-        stage: bench.predict(state.candidate(), state.gain, everything=True)
-        for stage, state in states.items()
-    }
+    predictions = {stage: bench.predict(state, everything=True) for stage, state in states.items()}
     residuals = {stage: bench.residuals(found) for stage, found in predictions.items()}
     rng = np.random.default_rng(17)
     result = {}

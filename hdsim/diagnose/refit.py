@@ -13,6 +13,9 @@ from hdsim.diagnose.fit import Fit, Vector, base_intervals, fit, robust_covarian
 from hdsim.diagnose.freedom import Free, Interval, State, base_freedoms
 from hdsim.diagnose.measured import Array
 
+#: Part of what the number that can do most alone can do, for another to do as well.
+ALONE = 0.8
+
 
 @dataclass
 class Refit:
@@ -35,6 +38,23 @@ class Refit:
         """Numbers whose start value lies outside their interval."""
         return [interval for interval in self.intervals if interval.moved]
 
+    def tie(self, bench: Bench) -> list[Interval]:
+        """Numbers each of which would do most of what the re-fit did alone, the best first, tied to another.
+
+        They stand in for one another: no interval may exclude its start value, although one of them is off.
+        """
+        columns, frees = self.fit.columns[:, : len(self.fit.frees)], list(self.fit.frees)
+        if self.fit.beside is not None:
+            columns, frees = np.hstack([columns, self.fit.beside[0]]), frees + self.fit.undetermined
+        along = columns.T @ bench.trace(self.before, self.fit.predictions)
+        power = along**2 / np.maximum((columns**2).sum(axis=0), 1e-300)
+        by_name = {interval.name: interval for interval in self.intervals}
+        order = [int(k) for k in np.argsort(-power) if power[k] >= ALONE * power.max()]
+        found = [by_name[frees[k].name] for k in order]
+        for one in found:
+            one.tied_to = [other.name for other in found if other is not one]
+        return found
+
 
 def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Refit:
     """Fit the base model's numbers to the training data.
@@ -47,9 +67,10 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     known = all(predictor.plan.load == "output_torque" for predictor in bench.predictors)
     locked = all(predictor.plan.locked for predictor in bench.predictors)
     if frees is None:
-        frees = base_freedoms(state, bench.channels, load_known=known, locked=locked)
+        period = bench.predictors[0].record.period_s
+        frees = base_freedoms(state, bench.channels, load_known=known, locked=locked, period_s=period)
     freedoms = list(frees)
-    before = bench.predict(state.candidate(), state.gain)
+    before = bench.predict(state)
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
@@ -76,7 +97,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
 def align(bench: Bench, found: Fit) -> None:
     """Turn locked records to where the fitted model carries nothing."""
     if bench.align(found.state, found.predictions):
-        found.predictions = bench.predict(found.state.candidate(), found.state.gain)
+        found.predictions = bench.predict(found.state)
 
 
 def reweigh(bench: Bench, found: Fit) -> None:

@@ -200,5 +200,7 @@ def left_of(bench: Bench, current: Fit) -> Residual:
     numbers = bench.stacked_series()
     offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
     unwound = [column[:, None] for column in bench.unwound(current.state, current.predictions).values()]
-    columns: Array = np.hstack([current.columns, offsets, *unwound])
+    # A delay of a few samples takes little, but without its bounds it would take all that lags.
+    own = [k for k in range(current.columns.shape[1]) if k >= len(current.frees) or not current.frees[k].step]
+    columns: Array = np.hstack([current.columns[:, own], offsets, *unwound])
     return Residual(bench.stacked(bench.residuals(current.predictions)), columns, bench.stacked_blocks())

@@ -56,9 +56,7 @@ def suspicions(bench: Bench, base: Refit, start: State) -> list[Problem]:
         start: the model as given.
     """
     if bench.training < len(bench.predictors):
-        before, after = (
-            bench.predict(state.candidate(), state.gain, everything=True) for state in (start, base.fit.state)
-        )
+        before, after = (bench.predict(state, everything=True) for state in (start, base.fit.state))
     else:
         before, after = base.before, base.fit.predictions
     scales = _scales(bench, before)

@@ -87,6 +87,8 @@ def _interval(number: FittedNumber, unit: str) -> str:
         return "not determined by these data" + (f": cannot be told from {tied}" if tied else "")
     low, high = number.interval
     text = f"{shown(low)} to {shown(high)}"
+    if number.tied_to:
+        text += f": hard to tell from {', '.join(named_number(name)[0] for name in number.tied_to)}"
     # The size of a phase means nothing; 120 degrees leave two thirds of the circle.
     if high - low > (120.0 if unit == "deg" else WIDE * abs(number.value)):
         text += " (poorly determined)"

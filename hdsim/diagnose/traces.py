@@ -118,7 +118,7 @@ def screen(
     kinds: dict[tuple[str, str], Screened] = {}
     wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
     with bench.coarse():
-        without = bench.predict(state.candidate(), state.gain)
+        without = bench.predict(state)
 
     def look(several: Sequence[Added]) -> None:
         with bench.coarse():

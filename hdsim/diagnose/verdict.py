@@ -127,7 +127,8 @@ class Verdict(_Part):
     parameters: dict[str, FittedNumber] = {}
     """The base model's own numbers, fitted."""
     moved: list[str] = []
-    """Those whose start value lies outside their interval."""
+    """Those whose start value lies outside their interval; where there is none although the re-fit closes a
+    gap, those that would do so alone."""
     gap: dict[str, Gap] = {}
     """By channel."""
     located: list[Located] = []

@@ -168,7 +168,14 @@ def headline(verdict: Verdict) -> str:
     elif verdict.verdict == "parameter":
         said = f"No effect is missing; {len(verdict.moved)} numbers of the model are off: "
         said = said.replace("1 numbers of the model are", "one number of the model is")
-        said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."
+        if _unsure(verdict):
+            names = "; ".join(named_number(name)[0] for name in verdict.moved)
+            said = (
+                "No effect is missing; a number of the model is off, these data do not tell for sure which: "
+            )
+            said += f"{names} ({'each' if len(verdict.moved) > 1 else 'it'} would explain most of it alone)."
+        else:
+            said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."
     else:
         for channel in verdict.gap:
             sentence = sentence.replace(channel, spoken(channel))
@@ -176,6 +183,15 @@ def headline(verdict: Verdict) -> str:
     # What is to be checked first stays first.
     doubt = sentence.partition("Check the data first: ")[2]
     return f"Check the data first (below). {said}" if doubt else said
+
+
+def _unsure(verdict: Verdict) -> bool:
+    """Whether some number is off, but no interval excludes the model's."""
+    numbers = [verdict.parameters[name] for name in verdict.moved]
+    return all(
+        n.interval is None or (n.start is not None and n.interval[0] <= n.start <= n.interval[1])
+        for n in numbers
+    )
 
 
 def _change(name: str, number: FittedNumber) -> str:
@@ -216,6 +232,12 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
             if search and search[-1].ranked
             else "No effect of the catalogue could be tried on these data."
         )
+    if verdict.verdict == "parameter" and _unsure(verdict):
+        fall = min(gap.refit / gap.before for gap in verdict.gap.values() if gap.before > 0)
+        said = ["No interval excludes the model's number, the gap does: numbers stand in for one another."]
+        said.append(nothing_more)
+        words = "Sure that a number is off, not which"
+        return Sureness(words, f"gap falls to {percent(fall)} with them", tuple(said))
     if verdict.verdict == "parameter":
         far = farthest(verdict)
         number = f"{far:.2g} standard errors" if far < 100 else "over 100 standard errors"

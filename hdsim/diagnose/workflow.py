@@ -153,13 +153,15 @@ def diagnose(
             # A curve that does not hold on data that it has not seen is none.
             curve, current = None, base.fit
             gap, predictions = gaps(bench, states | {"after": current.state})
-    intervals = base_intervals(current, base.freedoms)
-    intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
-    moved = [i.name for i in base.intervals if i.moved]
     fell = any(g.refit < (1.0 - LEAST_FALL) * g.before for g in gap.values())
+    off = base.moved or (base.tie(bench) if fell and base.fit.frees else [])
+    intervals = base.intervals
+    if current is not base.fit:
+        intervals = base_intervals(current, base.freedoms)
+        intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     common: dict[str, Any] = {
         "parameters": {i.name: _number(i) for i in intervals},
-        "moved": moved,
+        "moved": [i.name for i in off],
         "gap": gap,
         "located": _located(stages),
         "data_problems": [DataProblem(**vars(problem)) for problem in problems],
@@ -194,16 +196,13 @@ def diagnose(
         verdict = Verdict(
             verdict="effect", sentence=f"The model is missing {words}.", effects=effects, **common
         )
-    elif moved and fell:
-        changes = ", ".join(
-            f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip()
-            for i in base.intervals if i.moved
-        )  # fmt: skip
-        verdict = Verdict(
-            verdict="parameter",
-            sentence=f"No effect is missing; numbers of the model are off: {changes}.",
-            **common,
-        )
+    elif off and fell:
+        changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
+        said = f"numbers of the model are off: {', '.join(changes)}."
+        if not base.moved:
+            said = "a number of the model is off, and these data leave open which: "
+            said += " or ".join(i.name for i in off) + "."
+        verdict = Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
     else:
         verdict = Verdict(verdict="nothing", sentence="The data show nothing that the model lacks.", **common)
     if doubts:

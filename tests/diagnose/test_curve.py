@@ -117,10 +117,9 @@ def test_traces_of_torques_on_the_motor_are_those_of_the_simulation(tmp_path, ki
     for k in range(len(at)):
         values = [0.0] * len(at)
         values[k] = 0.01 * 52.0 / 100.0
-        curve = Table(curves=(kind.curve(at, np.array(values)),)).delayed(0.5)
-        there = fitted.fit.state.candidate()
-        there.effects["table"] = curve
-        (simulated,) = bench.predict(there, fitted.fit.state.gain)
+        curve = Table(curves=(kind.curve(at, np.array(values)),))
+        state = fitted.fit.state
+        (simulated,) = bench.predict(replace(state, effects={**state.effects, "table": curve}))
         series = bench.series[0]
         change = ((simulated - fitted.fit.predictions[0]) / series.sigma)[series.train]
         assert columns[:, k] == pytest.approx(change - change.mean(), abs=2e-3 * np.ptp(change) + 1e-4)

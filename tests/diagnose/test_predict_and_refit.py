@@ -2,9 +2,11 @@ import math
 
 import numpy as np
 import pytest
-from diagnose_bench import motion, rigid_record, scenario
+from diagnose_bench import RATE, motion, rigid_record, scenario
+from scipy.interpolate import CubicSpline
 
 from hdsim.diagnose.bench import Bench
+from hdsim.diagnose.fit import robust_covariance
 from hdsim.diagnose.freedom import Added, base_freedoms, state_of
 from hdsim.diagnose.measured import Record
 from hdsim.diagnose.predict import Predictor, plan_for, predictors
@@ -72,9 +74,41 @@ def test_a_wrong_inertia_and_friction_are_found_with_honest_intervals(tmp_path):
     state = found.fit.state
     total = state.drive.inertia.motor_kg_m2 + 1.93e-5 + (state.load.inertia_kg_m2 + 2e-5) / 1e4
     assert gain * total == pytest.approx(1.3 * (6.93e-5 + 0.50002 / 1e4), rel=0.01)
-    assert found.moved
+    # Inertia and friction both a third too large: most simply the torque constant.
+    assert [i.name for i in found.moved or found.tie(bench)] == ["motor_torque_gain"]
     # Two inertias that only add up cannot both be determined by the motor's torque.
     assert not all(i.determined for i in found.intervals)
+
+
+@pytest.mark.parametrize("late", [-0.6, 0.0, 1.4])
+def test_a_torque_that_is_stamped_late_or_early_does_not_bend_the_friction(tmp_path, late):
+    record = rigid_record(8.0, noise=5e-4)
+    t, period = record.time, 1.0 / RATE
+    shifted = CubicSpline(t, record.channels["motor_torque"])(np.clip(t - late * period, t[0], t[-1]))
+    record = Record("r", t, {**record.channels, "motor_torque": shifted})
+    found = refit(Bench(predictors([record], -100.0)), state_of(scenario(tmp_path)))
+    by_name = {i.name: i for i in found.intervals}
+    delay, viscous = by_name["motor_torque_delay_s"], by_name["drive.friction.viscous_nm_s_per_rad"]
+    assert delay.value == pytest.approx(late * period, abs=0.1 * period)
+    assert delay.low <= late * period <= delay.high
+    assert viscous.low <= 3.5e-4 <= viscous.high
+    assert not delay.moved
+
+
+def test_intervals_are_students_with_the_blocks_that_tell():
+    rng = np.random.default_rng(5)
+    blocks = np.repeat(np.arange(12), 40)
+    inside = {"all": 0, "four": 0}
+    for _ in range(400):
+        # White noise and a shock a block: that and nothing else is what a block shares.
+        rest = rng.standard_normal(480) + rng.standard_normal(12)[blocks]
+        for name, told in (("all", np.ones(480)), ("four", (blocks < 4).astype(float))):
+            column = told[:, None]
+            estimate = float(told @ rest / told.sum())
+            covariance = robust_covariance(column, rest - estimate * told, blocks, np.array([1e3]))
+            inside[name] += abs(estimate) <= 2.0 * math.sqrt(covariance[0, 0])
+    assert 0.92 <= inside["all"] / 400 <= 0.98
+    assert 0.92 <= inside["four"] / 400 <= 0.99
 
 
 def test_what_the_data_do_not_determine_stays_and_is_named(tmp_path):
