@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 
 UNITS = {"angle": "rad", "velocity": "rad/s", "torque": "N m", "temperature": "degC"}
 _TOLD_GAPS = 50
+#: Range of what a constant rate leaves of stamps in whole ticks, in ticks: one, and the rate's own error.
+WHOLE_TICK = 1.05
 
 
 def import_recording(path: str | Path, mapping: str | Path | Mapping | None = None) -> Recording:
@@ -275,20 +277,38 @@ def outliers(values: Array, mask: OutlierMask) -> NDArray[np.bool_]:
 
 
 def _spread(time: Array, place: str) -> Array:
-    """Even times for samples that share one: linear over the sample number between changes of the clock."""
+    """Times for samples that share one, stretch by stretch between missed ticks of the clock.
+
+    Where one constant rate meets every stamp to a tick, it is that of the samples; else they are spread
+    evenly over the sample number between changes of the clock.
+    """
     steps = np.diff(time)
     if (steps < 0).any():
         k = int(np.flatnonzero(steps < 0)[0])
         raise InputError(f"{place}: time goes back: sample {k + 2} at {time[k + 1]:.9g} s")
-    first = np.flatnonzero(np.concatenate([[True], steps > 0]))
-    if len(first) < 2:
+    if not (steps > 0).any():
         raise InputError(f"{place}: the clock never advances")
+    tick = float(np.median(steps[steps > 0]))
+    stretches = np.split(time, np.flatnonzero(steps > 1.5 * tick) + 1)
+    period = (time[-1] - time[0] - steps[steps > 1.5 * tick].sum()) / max(len(time) - len(stretches), 1)
+    return np.concatenate([_evened(stretch, tick, period) for stretch in stretches])
+
+
+def _evened(time: Array, tick: float, period: float) -> Array:
+    """The times of one stretch; ``period`` is the mean one, for a stretch without a change of the clock."""
     index = np.arange(len(time), dtype=np.float64)
+    first = np.flatnonzero(np.concatenate([[True], np.diff(time) > 0]))
+    if len(first) < 2:
+        return np.asarray(time[0] + period * index)
+    rate, start = np.polyfit(index, time, 1)
+    rest = time - (start + rate * index)
+    if np.ptp(rest) <= WHOLE_TICK * tick:
+        # A clock that counts whole ticks is late by half of one on the average.
+        return np.asarray(start + rate * index + 0.5 * (rest.min() + rest.max() + tick))
     # After the last change the mean rate goes on.
-    rate = (time[first[-1]] - time[first[0]]) / (first[-1] - first[0])
+    rate = (time[first[-1]] - time[0]) / first[-1]
     end = time[first[-1]] + rate * (len(time) - first[-1])
-    even: Array = np.interp(index, np.append(first, len(time)), np.append(time[first], end))
-    return even
+    return np.asarray(np.interp(index, np.append(first, len(time)), np.append(time[first], end)))
 
 
 def _at(time: Array, other: Array, values: Array) -> Array:

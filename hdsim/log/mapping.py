@@ -185,7 +185,8 @@ class TimeSource(Parameters):
     wraps_at: float | None = Field(None, gt=0)
     """Recorded number at which a counter starts at 0 again."""
     quantised: bool = False
-    """The clock is coarser than the samples: samples that share a time are spread evenly up to the next."""
+    """The clock is coarser than the samples: their constant rate is found, or, where there is none, samples
+    that share a time are spread evenly up to the next."""
 
     @model_validator(mode="after")
     def _one_source(self) -> TimeSource:

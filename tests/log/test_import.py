@@ -288,6 +288,25 @@ def test_a_coarse_clock_is_spread_over_the_samples(tmp_path):
     assert (np.diff(found.time) > 0).all()
 
 
+def test_a_constant_rate_is_seen_through_a_coarse_clock_and_a_gap(tmp_path):
+    # Ticks of two and a half samples: stamps come three times and twice in turn.
+    true = np.arange(900) * 0.002
+    true[500:] += 0.0731
+    mapping = BASE.replace("unit: s", "unit: s, quantised: true")
+    found = simple(tmp_path, np.floor(true / 0.005) * 0.005, true, mapping)
+    for part in (slice(0, 500), slice(500, 900)):
+        # The rate to a part in ten thousand, the beginning to half a tick.
+        np.testing.assert_allclose(np.diff(found.time[part]), 0.002, rtol=1e-4)
+        np.testing.assert_allclose(found.time[part], true[part], atol=0.0025)
+
+
+def test_a_rate_that_changes_is_not_taken_for_a_constant_one(tmp_path):
+    true = np.cumsum(np.where(np.arange(600) < 300, 0.002, 0.003))
+    mapping = BASE.replace("unit: s", "unit: s, quantised: true")
+    found = simple(tmp_path, np.floor(true / 0.016) * 0.016, true, mapping)
+    np.testing.assert_allclose(found.time, true, atol=0.016)
+
+
 def test_a_counter_that_wraps_goes_on(tmp_path):
     found = simple(
         tmp_path,
