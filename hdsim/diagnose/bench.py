@@ -110,6 +110,11 @@ class Bench:
         return tuple(dict.fromkeys(series.channel for series in self.series))
 
     @property
+    def load_known(self) -> bool:
+        """Whether the load is the measured torque at the output."""
+        return all(predictor.plan.load == "output_torque" for predictor in self.predictors)
+
+    @property
     def noise_powers(self) -> dict[str, float]:
         """What the sensors' noise alone leaves of each channel's whitened training residual, as power."""
         found = dict.fromkeys(self.channels, 0.0)

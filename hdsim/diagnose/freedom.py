@@ -235,7 +235,6 @@ def base_freedoms(
     *,
     load_known: bool = False,
     locked: bool = False,
-    period_s: float = 0.0,
 ) -> list[Free]:
     """Numbers that the model has and that a fit may move: the zero ones stay zero.
 
@@ -245,7 +244,6 @@ def base_freedoms(
         load_known: the output's torque is measured and given, so nothing of the load is free.
         locked: the output does not move: then only a second torque tells the sensitivity of the motor's from
             the drive's own stiffness and friction.
-        period_s: of the samples: torques may be stamped late or early by some of them; 0: they are not.
     """
     drive, load = state.drive, state.load
     found = [_free("drive.inertia.motor_kg_m2", drive.inertia.motor_kg_m2, "kg m^2")]
@@ -272,13 +270,26 @@ def base_freedoms(
                 found.append(Free(path, (path,), 0.7, value, field_name.rpartition("_nm")[1].strip("_")))
     if "motor_torque" in channels and ("output_torque" in channels or not locked):
         found.append(Free("motor_torque_gain", ("gain",), 0.15, state.gain, "1"))
-    found = [free for free in found if free.value > 0]
-    for channel in ("motor_torque", *(("output_torque",) if not load_known else ())):
-        if channel in channels and period_s:
-            now = state.delays.get(channel, 0.0)
-            path = f"{channel}_delay_s"
-            found.append(Free(path, (path,), DELAY_PRIOR, now, "s", period_s))
-    return found
+    return [free for free in found if free.value > 0]
+
+
+def delay_freedoms(
+    state: State, channels: Sequence[str], period_s: float, *, load_known: bool = False
+) -> list[Free]:
+    """Delays of the predicted torques beside the motion: a log may stamp them late or early.
+
+    Args:
+        state: the model.
+        channels: the predicted channels.
+        period_s: of the samples.
+        load_known: the output's torque is given, so only the motor's can be late.
+    """
+    torques = ("motor_torque",) if load_known else ("motor_torque", "output_torque")
+    return [
+        Free(f"{c}_delay_s", (f"{c}_delay_s",), DELAY_PRIOR, state.delays.get(c, 0.0), "s", period_s)
+        for c in torques
+        if c in channels
+    ]
 
 
 def _free(path: str, value: float, unit: str) -> Free:

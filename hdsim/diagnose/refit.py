@@ -9,12 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, Vector, base_intervals, fit, robust_covariance, sensitivities
-from hdsim.diagnose.freedom import Free, Interval, State, base_freedoms
+from hdsim.diagnose.fit import Fit, at_present, base_intervals, fit
+from hdsim.diagnose.freedom import Free, Interval, State, base_freedoms, delay_freedoms
 from hdsim.diagnose.measured import Array
 
 #: Part of what the number that can do most alone can do, for another to do as well.
 ALONE = 0.8
+#: Part of what is left beside the noise below which the delays that leave it are believed at once.
+ALL = 0.1
 
 
 @dataclass
@@ -38,22 +40,31 @@ class Refit:
         """Numbers whose start value lies outside their interval."""
         return [interval for interval in self.intervals if interval.moved]
 
-    def tie(self, bench: Bench) -> list[Interval]:
-        """Numbers each of which would do most of what the re-fit did alone, the best first, tied to another.
 
-        They stand in for one another: no interval may exclude its start value, although one of them is off.
-        """
-        columns, frees = self.fit.columns[:, : len(self.fit.frees)], list(self.fit.frees)
-        if self.fit.beside is not None:
-            columns, frees = np.hstack([columns, self.fit.beside[0]]), frees + self.fit.undetermined
-        along = columns.T @ bench.trace(self.before, self.fit.predictions)
-        power = along**2 / np.maximum((columns**2).sum(axis=0), 1e-300)
-        by_name = {interval.name: interval for interval in self.intervals}
-        order = [int(k) for k in np.argsort(-power) if power[k] >= ALONE * power.max()]
-        found = [by_name[frees[k].name] for k in order]
-        for one in found:
-            one.tied_to = [other.name for other in found if other is not one]
-        return found
+def tie(bench: Bench, before: Sequence[Array], found: Fit, intervals: Sequence[Interval]) -> list[Interval]:
+    """Numbers each of which would do most of what a fit did alone, the best first, tied to one another.
+
+    They stand in for one another: no interval may exclude its start value, although one of them is off.
+
+    Args:
+        bench: the measured series.
+        before: predictions of the model as given.
+        found: the fit.
+        intervals: its numbers; those that are found are marked as tied.
+    """
+    columns, frees = found.columns[:, : len(found.frees)], list(found.frees)
+    if found.beside is not None:
+        columns, frees = np.hstack([columns, found.beside[0]]), frees + found.undetermined
+    if not frees:
+        return []
+    along = columns.T @ bench.trace(before, found.predictions)
+    power = along**2 / np.maximum((columns**2).sum(axis=0), 1e-300)
+    by_name = {interval.name: interval for interval in intervals}
+    order = [int(k) for k in np.argsort(-power) if power[k] >= ALONE * power.max()]
+    tied = [by_name[frees[k].name] for k in order]
+    for one in tied:
+        one.tied_to = [other.name for other in tied if other is not one]
+    return tied
 
 
 def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Refit:
@@ -64,11 +75,9 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         state: the base model.
         frees: numbers that may move; all that the base has when None.
     """
-    known = all(predictor.plan.load == "output_torque" for predictor in bench.predictors)
     locked = all(predictor.plan.locked for predictor in bench.predictors)
     if frees is None:
-        period = bench.predictors[0].record.period_s
-        frees = base_freedoms(state, bench.channels, load_known=known, locked=locked, period_s=period)
+        frees = base_freedoms(state, bench.channels, load_known=bench.load_known, locked=locked)
     freedoms = list(frees)
     before = bench.predict(state)
     bench.weigh(bench.residuals(before))
@@ -77,21 +86,32 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     # Weights follow the residual: what the first fit explained no longer counts as noise.
     reweigh(bench, found)
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
-    undetermined, ties = found.undetermined, found.ties
-    slopes = found.columns, math.nan
-    found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes)
-    found.undetermined, found.ties = undetermined, ties
+    slopes, ties = (found.columns, math.nan), found.ties
+    unknown = found.undetermined
+    found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes, unknown=unknown)
+    found.ties = ties
     align(bench, found)
-    if undetermined and found.frees:
-        unknown = Vector(found.state, tuple(undetermined), 0)
-        found.beside = sensitivities(bench, unknown, unknown.start(), found.predictions), unknown.priors()
-        rest = bench.stacked(bench.residuals(found.predictions))
-        priors = np.array([free.prior for free in found.frees])
-        found.covariance = robust_covariance(
-            found.columns, rest, bench.stacked_blocks(), priors, found.beside
-        )
     reweigh(bench, found)
+    late = with_delays(bench, found)
+    noise = sum(bench.noise_powers.values())
+    if late and bench.power(late.predictions) - noise < ALL * (bench.power(found.predictions) - noise):
+        found = late
+        reweigh(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
+
+
+def with_delays(bench: Bench, found: Fit) -> Fit | None:
+    """The model with the torques' delays free too; None where they are, or none can be.
+
+    They come last: what is missing bends a delay as it bends any number, and a ripple hides behind one.
+    """
+    period = bench.predictors[0].record.period_s
+    free = delay_freedoms(found.state, bench.channels, period, load_known=bench.load_known)
+    if not free or any(each.step for each in found.frees):
+        return None
+    late = fit(bench, found.state, [*at_present(found), *free], prune=False, unknown=found.undetermined)
+    late.ties = found.ties
+    return late
 
 
 def align(bench: Bench, found: Fit) -> None:

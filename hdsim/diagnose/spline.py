@@ -10,6 +10,8 @@ from hdsim.diagnose.measured import Array
 from hdsim.errors import InputError
 
 if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
     from hdsim.actuation.signal_data import SignalData
 
 #: Time after the record for which its last piece goes on, s.
@@ -18,7 +20,7 @@ TAIL_S = 0.02
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0)
 
 
-def smoothed(time: Array, values: Array) -> tuple[Array, Array]:
+def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array, Array]:
     """Knots (k + 1,) and cubic coefficients (4, k) of the spline that predicts left-out samples best.
 
     Generalised cross-validation (Craven and Wahba 1979, Numerische Mathematik 31:377) of uniform
@@ -27,6 +29,7 @@ def smoothed(time: Array, values: Array) -> tuple[Array, Array]:
     Args:
         time: shape (n,), s, strictly increasing.
         values: shape (n,).
+        motion: the values are an angle, whose acceleration may jump where friction changes its sign.
     """
     from scipy.interpolate import CubicSpline, PPoly, make_lsq_spline
 
@@ -44,8 +47,7 @@ def smoothed(time: Array, values: Array) -> tuple[Array, Array]:
             spline = make_lsq_spline(time, values, knots, k=3)
         except (ValueError, np.linalg.LinAlgError):
             continue  # a gap leaves a stretch between knots without samples
-        residual = values - spline(time)
-        score = float(np.mean(residual**2)) / (1.0 - (pieces + 3) / n) ** 2
+        score = _score(time, values, spline)
         if score < best:
             best, chosen, rises = score, spline, 0
         else:
@@ -55,10 +57,48 @@ def smoothed(time: Array, values: Array) -> tuple[Array, Array]:
     if chosen is None:
         exact = CubicSpline(time, values)
         return np.asarray(exact.x), np.asarray(exact.c[::-1])
+    if motion:
+        jumping = _jumping(time, values, chosen)
+        if jumping is not None and _score(time, values, jumping) < best:
+            chosen = jumping
     pieces_of = PPoly.from_spline(chosen)
     keep = np.diff(pieces_of.x) > 0
     breaks = np.concatenate([pieces_of.x[:-1][keep], [time[-1]]])
     return breaks, np.asarray(pieces_of.c[::-1][:, keep])
+
+
+def _score(time: Array, values: Array, spline: BSpline) -> float:
+    """Generalised cross-validation's mean square of what is left."""
+    n = len(time)
+    return float(np.mean((values - spline(time)) ** 2)) / (1.0 - len(spline.c) / n) ** 2
+
+
+def _jumping(time: Array, values: Array, spline: BSpline) -> BSpline | None:
+    """The spline with a double knot, at which its second derivative may jump, at every reversal.
+
+    None where there is no reversal with room for one.
+    """
+    from scipy.interpolate import PPoly, make_lsq_spline
+
+    knots = spline.t[4:-4]
+    if len(knots) < 4:
+        return None
+    spacing = float(np.median(np.diff(knots)))
+    at = PPoly.from_spline(spline.derivative()).roots(discontinuity=False, extrapolate=False)
+    at = np.unique(at[np.isfinite(at)])
+    at = at[(at > knots[1]) & (at < knots[-2])]
+    # At rest the noise reverses it all the time: only what goes on for a while is a reversal.
+    apart = np.diff(at, prepend=-np.inf, append=np.inf) > 2.0 * spacing
+    at = at[apart[:-1] & apart[1:]]
+    if not len(at):
+        return None
+    following = np.clip(np.searchsorted(at, knots), 0, len(at) - 1)
+    nearest = np.minimum(np.abs(knots - at[following]), np.abs(knots - at[np.maximum(following - 1, 0)]))
+    inner = np.sort(np.concatenate([knots[nearest > 0.5 * spacing], at, at]))
+    try:
+        return make_lsq_spline(time, values, np.concatenate([spline.t[:4], inner, spline.t[-4:]]), k=3)
+    except (ValueError, np.linalg.LinAlgError):
+        return None  # a gap leaves a stretch between knots without samples
 
 
 def signal(breaks: Array, coefficients: Array, lead_in_s: float = 0.0) -> SignalData:

@@ -123,6 +123,8 @@ def _numbers(bench: Bench, base: Refit, after: list[Array], scales: list[Problem
             worse.append(f"{series.channel} is missed by {rests[1] / varies:.2g} times its own variation")
     far = []
     for free, theta in zip(base.fit.frees, base.fit.theta, strict=True):
+        if free.step:
+            continue  # a delay has no scale to be far from
         limit = FAR.get(free.name.rpartition(".")[2], FAR_OTHERWISE)
         # A number that closes no gap has only been bent by something that is missing; friction and
         # damping may be nothing.

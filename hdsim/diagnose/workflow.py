@@ -20,7 +20,7 @@ from hdsim.diagnose.measured import Array, Record, record_from
 from hdsim.diagnose.name import LEVEL, Named
 from hdsim.diagnose.predict import LoadSource, PredictionError, predictors
 from hdsim.diagnose.prove import gaps
-from hdsim.diagnose.refit import Refit, refit
+from hdsim.diagnose.refit import Refit, refit, tie
 from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.search import Stage, search
 from hdsim.diagnose.staging import staged
@@ -154,11 +154,10 @@ def diagnose(
             curve, current = None, base.fit
             gap, predictions = gaps(bench, states | {"after": current.state})
     fell = any(g.refit < (1.0 - LEAST_FALL) * g.before for g in gap.values())
-    off = base.moved or (base.tie(bench) if fell and base.fit.frees else [])
-    intervals = base.intervals
-    if current is not base.fit:
-        intervals = base_intervals(current, base.freedoms)
-        intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
+    intervals = [i for i in base_intervals(current, base.freedoms) if i.determined]
+    intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
+    moved = [i for i in intervals if i.moved]
+    off = moved or (tie(bench, base.before, current, intervals) if fell and not named else [])
     common: dict[str, Any] = {
         "parameters": {i.name: _number(i) for i in intervals},
         "moved": [i.name for i in off],
@@ -199,7 +198,7 @@ def diagnose(
     elif off and fell:
         changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
         said = f"numbers of the model are off: {', '.join(changes)}."
-        if not base.moved:
+        if not moved:
             said = "a number of the model is off, and these data leave open which: "
             said += " or ".join(i.name for i in off) + "."
         verdict = Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
