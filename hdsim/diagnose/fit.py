@@ -168,7 +168,7 @@ def fit(
     evaluations: int = EVALUATIONS,
     prune: bool = True,
     theta: Mapping[str, float] | None = None,
-    unknown: Sequence[Free] = (),
+    beside: tuple[Array, Array] | None = None,
     known: tuple[Array, float] | None = None,
     rough: bool = False,
 ) -> Fit:
@@ -182,7 +182,7 @@ def fit(
         evaluations: residuals that the optimiser may ask for.
         prune: leave numbers that the data do not determine where they are.
         theta: where the logarithms of the base's factors start, by name; 0 by default.
-        unknown: numbers that nobody knows; they stay where they are.
+        beside: sensitivities to numbers that nobody knows, and their prior spreads; see ``Fit``.
         known: sensitivities near the start to the first numbers, shape (rows, up to p), and what one
             independent sample of the residual will count (or nan), where they are known.
         rough: the covariance is not needed, nor the sensitivities at the end.
@@ -194,12 +194,11 @@ def fit(
 
     blocks = bench.stacked_blocks()
     chosen = list(frees)
-    undetermined = list(unknown)
+    undetermined: list[Free] = []
     ties: dict[str, list[str]] = {}
     power = known[1] if known is not None else math.nan
     if prune and chosen:
-        chosen, dropped, ties, known = _determined(bench, state, chosen, held_effects, blocks, theta)
-        undetermined += dropped
+        chosen, undetermined, ties, known = _determined(bench, state, chosen, held_effects, blocks, theta)
         power = known[1]
     series = any(added.fitting.in_series for added in state.added[held_effects:])
     vector = Vector(state, tuple(chosen), held_effects, series)
@@ -269,16 +268,11 @@ def fit(
     rest = found.fun[:rows] / worth
     own = len(chosen)
     columns = np.hstack([columns[:, :own] / vector.rates(found.x), columns[:, own:]])
-    end, predictions = vector.state(found.x), slopes.predictions[found.x.tobytes()]
-    beside, covariance = None, np.diag(priors**2)
-    if not rough:
-        if undetermined:
-            others = Vector(end, tuple(undetermined), len(end.added))
-            beside = sensitivities(bench, others, others.start(), predictions), others.priors()
-        covariance = robust_covariance(columns, rest, blocks, priors, beside)
+    covariance = np.diag(priors**2) if rough else robust_covariance(columns, rest, blocks, priors, beside)
     return Fit(
-        end, chosen, vector.logarithms(found.x), covariance, predictions, columns, undetermined, ties, beside
-    )
+        vector.state(found.x), chosen, vector.logarithms(found.x), covariance,
+        slopes.predictions[found.x.tobytes()], columns, undetermined, ties, beside,
+    )  # fmt: skip
 
 
 class _Slopes:
@@ -343,7 +337,7 @@ def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
     """A rough fit carried on to its very end, with the sensitivities and the covariance there."""
     known = found.columns, math.nan
     return fit(bench, found.state, at_present(found), held_effects=held_effects, prune=False,
-               evaluations=EVALUATIONS, unknown=found.undetermined, known=known)  # fmt: skip
+               evaluations=EVALUATIONS, beside=found.beside, known=known)  # fmt: skip
 
 
 def at_present(found: Fit) -> list[Free]:

@@ -9,7 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, at_present, base_intervals, fit
+from hdsim.diagnose.fit import (
+    Fit,
+    Vector,
+    at_present,
+    base_intervals,
+    fit,
+    robust_covariance,
+    sensitivities,
+)
 from hdsim.diagnose.freedom import Free, Interval, State, base_freedoms, delay_freedoms
 from hdsim.diagnose.measured import Array
 
@@ -86,11 +94,19 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     # Weights follow the residual: what the first fit explained no longer counts as noise.
     reweigh(bench, found)
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
-    slopes, ties = (found.columns, math.nan), found.ties
-    unknown = found.undetermined
-    found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes, unknown=unknown)
-    found.ties = ties
+    undetermined, ties = found.undetermined, found.ties
+    slopes = found.columns, math.nan
+    found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes)
+    found.undetermined, found.ties = undetermined, ties
     align(bench, found)
+    if undetermined and found.frees:
+        unknown = Vector(found.state, tuple(undetermined), 0)
+        found.beside = sensitivities(bench, unknown, unknown.start(), found.predictions), unknown.priors()
+        rest = bench.stacked(bench.residuals(found.predictions))
+        priors = np.array([free.prior for free in found.frees])
+        found.covariance = robust_covariance(
+            found.columns, rest, bench.stacked_blocks(), priors, found.beside
+        )
     reweigh(bench, found)
     late = with_delays(bench, found)
     noise = sum(bench.noise_powers.values())
@@ -109,8 +125,8 @@ def with_delays(bench: Bench, found: Fit) -> Fit | None:
     free = delay_freedoms(found.state, bench.channels, period, load_known=bench.load_known)
     if not free or any(each.step for each in found.frees):
         return None
-    late = fit(bench, found.state, [*at_present(found), *free], prune=False, unknown=found.undetermined)
-    late.ties = found.ties
+    late = fit(bench, found.state, [*at_present(found), *free], prune=False, beside=found.beside)
+    late.undetermined, late.ties = found.undetermined, found.ties
     return late
 
 

@@ -174,7 +174,7 @@ def _channel(name: str) -> str:
 
 def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
     """All numbers fitted together: the base's and those of all effects."""
-    return fit(bench, state or found.state, at_present(found), prune=False, unknown=found.undetermined)
+    return fit(bench, state or found.state, at_present(found), prune=False, beside=found.beside)
 
 
 def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:

@@ -170,9 +170,7 @@ def headline(verdict: Verdict) -> str:
         said = said.replace("1 numbers of the model are", "one number of the model is")
         if _unsure(verdict):
             names = "; ".join(named_number(name)[0] for name in verdict.moved)
-            said = (
-                "No effect is missing; a number of the model is off, these data do not tell for sure which: "
-            )
+            said = "No effect is missing; a number of the model is off, and these data leave open which: "
             said += f"{names} ({'each' if len(verdict.moved) > 1 else 'it'} would explain most of it alone)."
         else:
             said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 from diagnose_bench import RATE, motion, rigid_record, scenario
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.fit import base_intervals, robust_covariance
@@ -14,6 +14,32 @@ from hdsim.diagnose.refit import refit, tie, with_delays
 from hdsim.diagnose.spline import smoothed
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
+
+
+def test_smoothing_lets_the_acceleration_jump_where_friction_turns():
+    # A rotor with dry friction under a swinging torque never sticks; its acceleration jumps at each reversal.
+    fine, step = 20, 1e-3
+    speed = angle = 0.0
+    rows = []
+    for k in range(3000 * fine):
+        t = k * step / fine
+        rate = 900.0 * math.sin(4 * math.pi * t) - 150.0 * math.copysign(1.0, speed)
+        if k % fine == 0:
+            rows.append((t, angle, rate))
+        angle += step / fine * (speed + 0.5 * step / fine * rate)
+        speed += step / fine * rate
+    t, true, acceleration = np.array(rows).T
+    measured = true + 3e-4 * np.random.default_rng(3).standard_normal(len(t))
+    inside = slice(200, -200)
+    errors = []
+    for may_jump in (False, True):
+        breaks, c = smoothed(t, measured, motion=may_jump)
+        errors.append(float(np.std((PPoly(c[::-1], breaks)(t, 2) - acceleration)[inside])))
+    assert errors[1] < 0.7 * errors[0]
+    # A motion without a jump is left as it is.
+    t, angle, _, _ = motion(6.0)
+    noisy = angle + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    assert len(smoothed(t, noisy, motion=True)[0]) == len(smoothed(t, noisy)[0])
 
 
 def test_smoothing_follows_the_motion_and_not_the_noise():

@@ -54,8 +54,11 @@ def test_kinova_joints_lack_friction_first_and_the_gap_falls_below_a_third(joint
     if joint == 6:
         # The torque sensor ripples twice a wave-generator turn: 200 per output turn behind a ratio of 100.
         assert 2.0 in orders(next(effect for effect in found.effects if effect.name == "sensors"))
-        # The motor's own order 12, 1200 per output turn.
+        # The motor's own order 12, 1200 per output turn: 2 % of what was missing, but a sharp line.
         assert any(12.0 in place.orders for place in found.located if place.channel == "motor_torque")
+        assert 12.0 in orders(
+            next(effect for effect in found.effects if effect.name == "motor_torque_ripple")
+        )
 
 
 @pytest.mark.slow

@@ -219,6 +219,21 @@ def test_how_far_a_number_moved_is_in_standard_errors_of_its_logarithm(found):
     assert farthest(verdict) == pytest.approx(5.0)
 
 
+def test_a_number_that_is_off_is_said_though_no_interval_excludes_it(tmp_path):
+    # All that the motor feels a third larger: inertia, friction, or simply the torque constant.
+    total = 6.93e-5 + 0.50002 / 1e4
+    record = rigid_record(8.0, inertia=1.3 * total, coulomb=0.039, viscous=4.55e-4)
+    found = diagnose([record], scenario(tmp_path))
+    assert found.verdict.verdict == "parameter"
+    assert found.verdict.moved == ["motor_torque_gain"]
+    said = headline(found.verdict)
+    assert "leave open which: motor torque gain" in said
+    sure = sureness(found)
+    assert "not which" in sure.words
+    fall = found.verdict.gap["motor_torque"]
+    assert f"{100 * fall.refit / fall.before:.0f}" in sure.number
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [
