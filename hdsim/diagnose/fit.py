@@ -379,7 +379,7 @@ def sensitivities(
         shifted[k] += step
         states.append(vector.state(shifted))
     # How a channel is read needs no simulation.
-    read = [first <= k < len(vector.frees) and vector.frees[k].reading for k in range(first, len(x))]
+    read = [k < len(vector.frees) and vector.frees[k].reading for k in range(first, len(x))]
     simulated = iter(bench.predict_all([s for s, only in zip(states, read, strict=True) if not only]))
     rows = len(bench.stacked_blocks())
     columns = np.zeros((rows, len(steps)))

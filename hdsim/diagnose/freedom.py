@@ -230,11 +230,7 @@ _PRIORS = {
 
 
 def base_freedoms(
-    state: State,
-    channels: Sequence[str],
-    *,
-    load_known: bool = False,
-    locked: bool = False,
+    state: State, channels: Sequence[str], *, load_known: bool = False, locked: bool = False
 ) -> list[Free]:
     """Numbers that the model has and that a fit may move: the zero ones stay zero.
 

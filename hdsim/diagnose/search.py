@@ -2,7 +2,8 @@
 
 The first names are given while other effects are still missing, so each is asked again once there are
 several: the model without it, but with all others, is screened anew, and the best effect there takes its
-place or, when nothing significant is missing there, none does.
+place or, when nothing significant is missing there, none does. The torques' delays are fitted when nothing
+more is found, and all is asked once more when they have explained something.
 """
 
 from __future__ import annotations

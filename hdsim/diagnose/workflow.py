@@ -157,7 +157,9 @@ def diagnose(
     intervals = [i for i in base_intervals(current, base.freedoms) if i.determined]
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     moved = [i for i in intervals if i.moved]
-    off = moved or (tie(bench, base.before, current, intervals) if fell and not named else [])
+    off = moved
+    if fell and not (moved or named or unknown or rest_of):
+        off = tie(bench, base.before, current, intervals)
     common: dict[str, Any] = {
         "parameters": {i.name: _number(i) for i in intervals},
         "moved": [i.name for i in off],
