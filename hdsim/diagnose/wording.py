@@ -169,9 +169,13 @@ def headline(verdict: Verdict) -> str:
         said = f"No effect is missing; {len(verdict.moved)} numbers of the model are off: "
         said = said.replace("1 numbers of the model are", "one number of the model is")
         if _unsure(verdict):
-            names = "; ".join(named_number(name)[0] for name in verdict.moved)
-            said = "No effect is missing; a number of the model is off, and these data leave open which: "
-            said += f"{names} ({'each' if len(verdict.moved) > 1 else 'it'} would explain most of it alone)."
+            names = [named_number(name)[0] for name in verdict.moved]
+            said = "No effect is missing; a number of the model is off, "
+            said += (
+                f"most simply {names[0]} (it would explain most of it alone)."
+                if len(names) == 1
+                else f"and these data leave open which: {'; '.join(names)} (each would explain most alone)."
+            )
         else:
             said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."
     else:
@@ -235,7 +239,7 @@ def sureness(diagnosis: Diagnosis) -> Sureness:
         said = ["No interval excludes the model's number, the gap does: numbers stand in for one another."]
         said.append(nothing_more)
         words = "Sure that a number is off, not which"
-        return Sureness(words, f"gap falls to {percent(fall)} with them", tuple(said))
+        return Sureness(words, f"the re-fit lets a gap fall to {percent(fall)}", tuple(said))
     if verdict.verdict == "parameter":
         far = farthest(verdict)
         number = f"{far:.2g} standard errors" if far < 100 else "over 100 standard errors"

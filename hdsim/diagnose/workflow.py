@@ -201,8 +201,7 @@ def diagnose(
         changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
         said = f"numbers of the model are off: {', '.join(changes)}."
         if not moved:
-            said = "a number of the model is off, and these data leave open which: "
-            said += " or ".join(i.name for i in off) + "."
+            said = f"a number of the model is off, most simply {' or '.join(i.name for i in off)}."
         verdict = Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
     else:
         verdict = Verdict(verdict="nothing", sentence="The data show nothing that the model lacks.", **common)

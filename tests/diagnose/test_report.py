@@ -227,7 +227,7 @@ def test_a_number_that_is_off_is_said_though_no_interval_excludes_it(tmp_path):
     assert found.verdict.verdict == "parameter"
     assert found.verdict.moved == ["motor_torque_gain"]
     said = headline(found.verdict)
-    assert "leave open which: motor torque gain" in said
+    assert "most simply motor torque gain" in said
     sure = sureness(found)
     assert "not which" in sure.words
     fall = found.verdict.gap["motor_torque"]
