@@ -9,12 +9,13 @@ which a drive of the same size lies.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.check import Problem, explain, slope
-from hdsim.diagnose.freedom import State
+from hdsim.diagnose.freedom import Interval, State
 from hdsim.diagnose.measured import Array, Mask
 from hdsim.diagnose.predict import Predictor
 from hdsim.diagnose.refit import Refit
@@ -35,6 +36,8 @@ FAR = {
 FAR_OTHERWISE = 5.0
 #: Numbers of a drive that may well be far smaller than thought.
 MAYBE_NONE = ("coulomb_nm", "viscous_nm_s_per_rad", "load_coefficient", "damping_nm_s_per_rad")
+#: Least delay that is told, samples.
+LATE = 0.5
 #: Share of a channel's variation that one factor must explain to be evidence, and how near a cause must be.
 EXPLAINED, NEAR = 0.5, 0.25
 #: The same for the part that follows the acceleration.
@@ -61,6 +64,29 @@ def suspicions(bench: Bench, base: Refit, start: State) -> list[Problem]:
         before, after = base.before, base.fit.predictions
     scales = _scales(bench, before)
     return [*scales, *_numbers(bench, base, after, scales), *_other_holdouts(bench, after)]
+
+
+def delays(bench: Bench, intervals: Sequence[Interval]) -> list[Problem]:
+    """Torques that the log stamps late or early beside the motion, by half a sample or more.
+
+    Args:
+        bench: the measured series.
+        intervals: fitted numbers, those of the delays among them.
+    """
+    record = bench.predictors[0].record
+    found = []
+    for one in intervals:
+        channel, is_delay, _ = one.name.partition("_delay_s")
+        if not is_delay or one.low <= 0.0 <= one.high or abs(one.value) < LATE * record.period_s:
+            continue
+        side = "late" if one.value > 0 else "early"
+        message = (
+            f"is stamped {1e3 * abs(one.value):.2g} ms {side} beside the motion "
+            f"({abs(one.value) / record.period_s:.2g} samples; 95 % interval {1e3 * one.low:.2g} to "
+            f"{1e3 * one.high:.2g} ms); the fits take that into account"
+        )
+        found.append(Problem(record.name, channel, "clock", "info", message))
+    return found
 
 
 def _scales(bench: Bench, before: list[Array]) -> list[Problem]:

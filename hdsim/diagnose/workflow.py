@@ -24,7 +24,7 @@ from hdsim.diagnose.refit import Refit, refit, tie
 from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.search import Stage, search
 from hdsim.diagnose.staging import staged
-from hdsim.diagnose.suspect import suspicions
+from hdsim.diagnose.suspect import delays, suspicions
 from hdsim.diagnose.verdict import DataProblem, FittedNumber, Gap, Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
@@ -156,6 +156,7 @@ def diagnose(
     fell = any(g.refit < (1.0 - LEAST_FALL) * g.before for g in gap.values())
     intervals = [i for i in base_intervals(current, base.freedoms) if i.determined]
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
+    problems += delays(bench, intervals)
     moved = [i for i in intervals if i.moved]
     off = moved
     if fell and not (moved or named or unknown or rest_of):

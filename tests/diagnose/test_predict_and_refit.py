@@ -12,6 +12,7 @@ from hdsim.diagnose.measured import Record
 from hdsim.diagnose.predict import Predictor, plan_for, predictors
 from hdsim.diagnose.refit import refit, tie, with_delays
 from hdsim.diagnose.spline import smoothed
+from hdsim.diagnose.suspect import delays
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 
@@ -124,6 +125,10 @@ def test_a_torque_that_is_stamped_late_or_early_does_not_bend_the_friction(tmp_p
     assert delay.low <= late * period <= delay.high
     assert viscous.low <= 3.5e-4 <= viscous.high
     assert not delay.moved
+    told = delays(bench, by_name.values())
+    assert [(p.channel, p.kind, "early" in p.message) for p in told] == (
+        [("motor_torque", "clock", late < 0)] if late else []
+    )
 
 
 def test_intervals_are_students_with_the_blocks_that_tell():
