@@ -25,7 +25,15 @@ from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.search import Stage, search
 from hdsim.diagnose.staging import staged
 from hdsim.diagnose.suspect import delays, suspicions
-from hdsim.diagnose.verdict import DataProblem, FittedNumber, Gap, Located, NamedEffect, Verdict
+from hdsim.diagnose.verdict import (
+    DataProblem,
+    FittedNumber,
+    Gap,
+    Located,
+    NamedEffect,
+    Remainder,
+    Verdict,
+)
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 
@@ -171,27 +179,9 @@ def diagnose(
         "seconds": seconds,
     }
     if unknown:
-        place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
-        suspects = {one.name: round(one.share, 3) for one in named}
-        verdict = Verdict(
-            verdict="unknown",
-            sentence="Something is missing that nothing in the catalogue explains: "
-            f"{100 * place.share:.0f} % of what is left of {place.channel} is a function of "
-            f"{place.coordinate.replace('_', ' ')}.",
-            suspects=suspects,
-            curve=curve.found() if curve is not None else None,
-            **common,
-        )
+        verdict = _without_a_name(stages, named, curve, common)
     elif rest_of is not None:
-        verdict = Verdict(
-            verdict="unknown",
-            sentence=f"Something is missing that nothing in the catalogue explains: {rest_of.channel} of "
-            f"{rest_of.record} is left with up to {rest_of.times_noise:.2g} times its noise, most of it "
-            f"between {rest_of.start_s:.3g} and {rest_of.end_s:.3g} s, and a function of no coordinate that "
-            "these data repeat.",
-            remainder=rest_of,
-            **common,
-        )
+        verdict = _without_a_place(rest_of, common)
     elif named:
         effects = _effects(named, current)
         words = " and ".join(_words(effect) for effect in effects)
@@ -199,17 +189,48 @@ def diagnose(
             verdict="effect", sentence=f"The model is missing {words}.", effects=effects, **common
         )
     elif off and fell:
-        changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
-        said = f"numbers of the model are off: {', '.join(changes)}."
-        if not moved:
-            said = f"a number of the model is off, most simply {' or '.join(i.name for i in off)}."
-        verdict = Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
+        verdict = _numbers_off(off, common, sure=bool(moved))
     else:
         verdict = Verdict(verdict="nothing", sentence="The data show nothing that the model lacks.", **common)
     if doubts:
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
     return Diagnosis(verdict, checks, bench, base, stages, named, current, start, explained, predictions)
+
+
+def _without_a_name(
+    stages: Sequence[Stage], named: Sequence[Named], curve: CurveFit | None, common: Mapping[str, Any]
+) -> Verdict:
+    place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
+    return Verdict(
+        verdict="unknown",
+        sentence="Something is missing that nothing in the catalogue explains: "
+        f"{100 * place.share:.0f} % of what is left of {place.channel} is a function of "
+        f"{place.coordinate.replace('_', ' ')}.",
+        suspects={one.name: round(one.share, 3) for one in named},
+        curve=curve.found() if curve is not None else None,
+        **common,
+    )
+
+
+def _without_a_place(rest: Remainder, common: Mapping[str, Any]) -> Verdict:
+    return Verdict(
+        verdict="unknown",
+        sentence=f"Something is missing that nothing in the catalogue explains: {rest.channel} of "
+        f"{rest.record} is left with up to {rest.times_noise:.2g} times its noise, most of it "
+        f"between {rest.start_s:.3g} and {rest.end_s:.3g} s, and a function of no coordinate that "
+        "these data repeat.",
+        remainder=rest,
+        **common,
+    )
+
+
+def _numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:
+    changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
+    said = f"numbers of the model are off: {', '.join(changes)}."
+    if not sure:
+        said = f"a number of the model is off, most simply {' or '.join(i.name for i in off)}."
+    return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
 
 
 def _misfit(named: Sequence[Named], last: Location, explained: float) -> bool:
