@@ -145,7 +145,11 @@ def diagnose(
     last = stages[-1].location
     rest = last.structured * left.power
     explained /= max(explained + rest, 1e-300)
-    unknown = last.chance <= LEVEL and _misfit(named, last, explained)
+    states = {"before": start, "refit": base.fit.state, "after": current.state}
+    with step("prove", "proving on held-out data"):
+        gap, predictions = gaps(bench, states)
+    # A name, or a curve, that does not hold on data that it has not seen is none.
+    unknown = (last.chance <= LEVEL and _misfit(named, last, explained)) or (bool(named) and not _proved(gap))
     rest_of = None if named or unknown else remainder(bench, current.predictions)
     curve: CurveFit | None = None
     if unknown:
@@ -153,14 +157,13 @@ def diagnose(
         current = base.fit
         with step("curve", "fitting the curve of what has no name"):
             curve = fit_curve(bench, base.fit, stages[0].location, on_step=tell)
+        with step("prove", "proving on held-out data"):
+            if curve is not None:
+                gap, predictions = gaps(bench, states | {"after": curve.fit.state})
+                curve = curve if _proved(gap) else None
+            if curve is None:
+                gap, predictions = gaps(bench, states | {"after": current.state})
         current = curve.fit if curve is not None else current
-    with step("prove", "proving on held-out data"):
-        states = {"before": start, "refit": base.fit.state, "after": current.state}
-        gap, predictions = gaps(bench, states)
-        if curve is not None and not _proved(gap):
-            # A curve that does not hold on data that it has not seen is none.
-            curve, current = None, base.fit
-            gap, predictions = gaps(bench, states | {"after": current.state})
     fell = any(g.refit < (1.0 - LEAST_FALL) * g.before for g in gap.values())
     intervals = [i for i in base_intervals(current, base.freedoms) if i.determined]
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
