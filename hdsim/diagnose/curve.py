@@ -395,7 +395,8 @@ def _solved(
             coefficients = coefficients - np.median(even)
         # The model's own numbers take their part again.
         moved, *_ = np.linalg.lstsq(np.hstack([own, offsets]), rest - columns @ step, rcond=1e-6)
-        theta = theta + moved[: len(theta)]
+        # What the data hardly tell is not carried away.
+        theta = np.clip(theta + moved[: len(theta)], -2.0, 2.0)
         state = scaled(fit.state, fit.frees, theta.tolist())
         state = replace(
             state, added=(*state.added, replace(added, coefficients=tuple(coefficients.tolist())))

@@ -518,7 +518,8 @@ def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
     first = {free.name: free.value for free in starts}
     intervals = []
     for k, free in enumerate(found.frees):
-        now, spread = float(found.theta[k]), 2.0 * math.sqrt(found.covariance[k, k])
+        # A factor of e^20 to either side says enough of a number that nobody knows.
+        now, spread = float(found.theta[k]), min(2.0 * math.sqrt(found.covariance[k, k]), 20.0)
         value, low, high = free.at(now), free.at(now - spread), free.at(now + spread)
         intervals.append(Interval(free.name, value, first.get(free.name, free.value), low, high, free.unit))
     for free in found.undetermined:
