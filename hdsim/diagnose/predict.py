@@ -137,7 +137,8 @@ class Predictor:
     def __init__(self, record: Record, plan: Plan, ratio: float, rtol: float = RTOL) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
         values = record.filled(plan.motion)
-        breaks, coefficients = smoothed(record.time, values, motion=True)
+        # Ramps against a locked output creep: they reverse without a jump that could be seen.
+        breaks, coefficients = smoothed(record.time, values, motion=not plan.locked)
         if plan.motion == "output_angle":
             coefficients = coefficients * ratio
         if plan.locked:
