@@ -166,8 +166,6 @@ def headline(verdict: Verdict) -> str:
             parts.append(" or ".join(titles) + (" (these data cannot tell which)" if len(titles) > 1 else ""))
         said = f"The model is missing {'; and '.join(parts)}."
     elif verdict.verdict == "parameter":
-        said = f"No effect is missing; {len(verdict.moved)} numbers of the model are off: "
-        said = said.replace("1 numbers of the model are", "one number of the model is")
         if _unsure(verdict):
             names = [named_number(name)[0] for name in verdict.moved]
             said = "No effect is missing; a number of the model is off, "
@@ -177,6 +175,8 @@ def headline(verdict: Verdict) -> str:
                 else f"and these data leave open which: {'; '.join(names)} (each would explain most alone)."
             )
         else:
+            said = f"No effect is missing; {len(verdict.moved)} numbers of the model are off: "
+            said = said.replace("1 numbers of the model are", "one number of the model is")
             said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."
     else:
         for channel in verdict.gap:

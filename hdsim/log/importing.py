@@ -289,8 +289,9 @@ def _spread(time: Array, place: str) -> Array:
     if not (steps > 0).any():
         raise InputError(f"{place}: the clock never advances")
     tick = float(np.median(steps[steps > 0]))
-    stretches = np.split(time, np.flatnonzero(steps > 1.5 * tick) + 1)
-    period = (time[-1] - time[0] - steps[steps > 1.5 * tick].sum()) / max(len(time) - len(stretches), 1)
+    missed = steps > 1.5 * tick
+    stretches = np.split(time, np.flatnonzero(missed) + 1)
+    period = (time[-1] - time[0] - steps[missed].sum()) / max(len(time) - len(stretches), 1)
     return np.concatenate([_evened(stretch, tick, period) for stretch in stretches])
 
 
