@@ -81,11 +81,10 @@ def fitted_numbers(added: Added, covariance: Array, shape_spreads: Array) -> dic
         size = math.hypot(a, b)
         part = covariance[at : at + 2, at : at + 2]
         along = np.array([a, b]) / max(size, 1e-12)
-        across = np.array([-b, a]) / max(size, 1e-12)
         half = 2.0 * math.sqrt(max(float(along @ part @ along), 0.0))
         found[amplitude] = _value(unit * size, unit * max(size - half, 0.0), unit * (size + half))
         angle = math.degrees(math.atan2(b, a))
-        wide = math.degrees(2.0 * math.sqrt(max(float(across @ part @ across), 0.0)) / max(size, 1e-12))
+        wide = _seen_under(np.array([a, b]), part)
         found[phase] = _value(angle, angle - wide, angle + wide)
         at += 2
 
@@ -116,6 +115,18 @@ def fitted_numbers(added: Added, covariance: Array, shape_spreads: Array) -> dic
         factor = math.exp(min(2.0 * float(deviation), 20.0))
         found[shape.path] = _value(value, value / factor, value * factor)
     return found
+
+
+def _seen_under(centre: Array, covariance: Array) -> float:
+    """Largest angle from a vector to its 95 % ellipse, degrees; 180 where that holds the origin."""
+    values, vectors = np.linalg.eigh(covariance)
+    axes = 2.0 * np.sqrt(np.maximum(values, 0.0))
+    if np.sum((vectors.T @ centre / np.maximum(axes, 1e-300)) ** 2) <= 1.0:
+        return 180.0
+    turn = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    edge = centre[:, None] + vectors @ (axes[:, None] * np.array([np.cos(turn), np.sin(turn)]))
+    away = np.arctan2(centre[0] * edge[1] - centre[1] * edge[0], centre @ edge)
+    return float(np.degrees(np.max(np.abs(away))))
 
 
 def _value(value: float, low: float, high: float) -> FittedNumber:

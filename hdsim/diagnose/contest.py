@@ -58,7 +58,7 @@ def _as_given(bench: Bench, base: Fit) -> _Point:
     """The base at its numbers before they were fitted."""
     frees = at_present(base)
     state = scaled(base.state, frees, (-base.theta).tolist())
-    there = [replace(free, value=free.at(-t)) for free, t in zip(frees, base.theta, strict=True)]
+    there = [free.moved(-t) for free, t in zip(frees, base.theta, strict=True)]
     # All effects are held there.
     vector = Vector(state, tuple(there), len(state.added))
     predictions = bench.predict(state)
@@ -148,8 +148,10 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
         power: what one independent sample of the linear fit's residual counts.
     """
     frees, coefficients = at_present(base), np.array(added.coefficients)
-    square = point.columns.T @ point.columns + np.diag([power / free.prior**2 for free in frees])
-    moves = np.linalg.solve(square, point.columns.T @ (point.left - columns @ coefficients))
+    ridge = np.array([power / free.prior**2 for free in frees])
+    square = point.columns.T @ point.columns + np.diag(ridge)
+    away = np.array([free.none for free in frees]) - point.theta
+    moves = np.linalg.solve(square, point.columns.T @ (point.left - columns @ coefficients) + ridge * away)
     stiff = np.array(["stiffness" in free.name for free in frees], dtype=bool)
     series = added.fitting.in_series
     if series:

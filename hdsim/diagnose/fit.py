@@ -37,6 +37,9 @@ EVALUATIONS = 8
 ROUGHLY, ROUNDS, TIGHT = 3e-4, 2, 0.25
 #: Least degrees of freedom of an interval: with fewer nobody can say what a spread is.
 FEWEST_DEGREES = 3.0
+#: Size of a direction, all columns of length 1, below which what they say of it may be their own error, and
+#: change of the whitened predictions along it, root mean square, below which it is the solver's.
+WEAK, HEARD = 0.05, 0.02
 #: Part of a step's change that a Jacobian may get wrong and still be corrected instead of made anew, and of
 #: the residual that it may get wrong and stay as it is.
 FORETOLD, NEGLIGIBLE = 0.3, 0.01
@@ -256,7 +259,7 @@ def fit(
             columns = slopes.at(found.x)
             break
         # The end is where the exact Jacobian promises less than an independent sample of the data is worth.
-        columns = slopes.exact(found.x)
+        columns = slopes.proved(found.x)
         whole = jacobian(found.x)
         free = found.active_mask == 0
         step, *_ = np.linalg.lstsq(whole[:, free], -found.fun, rcond=None)
@@ -302,6 +305,30 @@ class _Slopes:
         self._columns, self._at = columns, x.copy()
         return self._columns
 
+    def proved(self, x: Array) -> Array:
+        """The Jacobian at ``x`` with each direction in which its columns cancel tried as a whole.
+
+        What is left of columns that cancel is mostly their own error, which would be taken for knowledge.
+        """
+        columns = self.exact(x)
+        lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        _, sizes, directions = np.linalg.svd(np.linalg.qr(columns / lengths, mode="r"))
+        weak = [v / lengths for v, size in zip(directions, sizes, strict=True) if size < WEAK]
+        most = self._vector.steps(x)
+        weak = [d * float(np.min(most / np.maximum(np.abs(d), 1e-300))) for d in weak]
+        states = [self._vector.state(x + sign * d) for d in weak for sign in (1.0, -1.0)]
+        there = self._bench.predict_all(states)
+        for d, ahead, back in zip(weak, there[::2], there[1::2], strict=True):
+            if ahead is None or back is None:
+                continue
+            change = 0.5 * self._bench.trace(back, ahead)
+            if math.sqrt(np.mean(change**2)) < HEARD:
+                change = np.zeros_like(change)
+            along = d * lengths**2
+            columns = columns + np.outer(change - columns @ d, along / (d @ along))
+        self._columns = columns
+        return columns
+
     def at(self, x: Array) -> Array:
         """The Jacobian at ``x``, corrected or made anew, shape (rows, p)."""
         if self._columns is None or self._at is None:
@@ -342,7 +369,7 @@ def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
 
 def at_present(found: Fit) -> list[Free]:
     """A fit's free numbers at their fitted values."""
-    return [replace(free, value=free.at(float(t))) for free, t in zip(found.frees, found.theta, strict=True)]
+    return [free.moved(float(t)) for free, t in zip(found.frees, found.theta, strict=True)]
 
 
 def sensitivities(

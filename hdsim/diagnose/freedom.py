@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class Free:
         value: the start value, of the first path.
         unit: of the value.
         step: where it is not 0, the value is the start plus theta times this: it may be negative.
+        given: theta of the model's own number as it was before anything was fitted.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Free:
     value: float
     unit: str = ""
     step: float = 0.0
+    given: float = 0.0
 
     @property
     def reading(self) -> bool:
@@ -52,12 +54,16 @@ class Free:
 
     @property
     def none(self) -> float:
-        """Where a prior's centre is: theta of the start, or of no delay."""
-        return -self.value / self.step if self.step else 0.0
+        """Where the prior's centre is: theta of the model's own number, or of no delay."""
+        return -self.value / self.step if self.step else self.given
 
     def at(self, theta: float) -> float:
         """The value at ``theta``."""
         return self.value + self.step * theta if self.step else self.value * math.exp(theta)
+
+    def moved(self, theta: float) -> Free:
+        """The same number, started at ``theta``: what was believed of it before stays."""
+        return replace(self, value=self.at(theta), given=self.given - theta)
 
 
 @dataclass(frozen=True)

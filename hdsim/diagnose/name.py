@@ -31,6 +31,8 @@ ALIKE = 0.1
 SOFTER = 0.03
 #: Part of its share that another effect must keep beside the best to be an effect of its own.
 BESIDE = 0.6
+#: Part of all that there is to explain beyond which two effects cannot have explained parts of their own.
+OVERLAP = 1.2
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
 SAME = 0.02
 #: The same for effects that are known to look alike, when neither reaches the noise.
@@ -102,22 +104,26 @@ def name_effect(
     if not results:
         return None
     results.sort(key=lambda result: float(result[2].sum()))
-    name, found, losses = results[0]
-    explained = float((before - losses).sum())
+    explained = float((before - results[0][2]).sum())
     if explained <= 0:
         return None
+    results = _simplest_first(results, SAME * explained)
+    name, found, losses = results[0]
     group = {}
     on_screen = {one.name: one for one in shortlist}
+    noise = sum(bench.noise_powers.values())
+    most = OVERLAP * (float(before.sum()) - noise)
     for other, rival, rest in results[1:]:
         difference = rest - losses
         spread = float(np.sqrt(len(difference)) * difference.std())
-        if beside(residual, on_screen[name], on_screen[other]):
+        apart = explained + float((before - rest).sum()) < most
+        if apart and beside(residual, on_screen[name], on_screen[other]):
             continue
         same = max(2.0 * spread, SAME * explained)
         if confusable(name, other):
             # Two formulas that both miss the noise are not told apart by less than what the better one lacks,
             # nor a simple one from one with more freedom, which may reach the noise where it does not.
-            lacks = float(losses.sum()) - sum(bench.noise_powers.values())
+            lacks = float(losses.sum()) - noise
             freer = freedom(found) > freedom(rival)
             same = max(same, MISMATCH * explained if freer else min(lacks, MISMATCH * explained))
         if difference.sum() < same:
@@ -135,6 +141,17 @@ def name_effect(
             for o, each, _ in results[1:]
         },
     )
+
+
+def _simplest_first(results: list[tuple[str, Fit, Array]], same: float) -> list[tuple[str, Fit, Array]]:
+    """The results, the one of least freedom first of those that blocks of time cannot tell from the best."""
+
+    def level(rest: Array) -> bool:
+        difference = rest - results[0][2]
+        return float(difference.sum()) <= min(2.0 * float(np.sqrt(len(rest)) * difference.std()), same)
+
+    best = min((result for result in results if level(result[2])), key=lambda result: freedom(result[1]))
+    return [best, *(result for result in results if result is not best)]
 
 
 def freedom(found: Fit) -> int:

@@ -200,8 +200,12 @@ def _setup(trial: Trial, rng: np.random.Generator) -> Setup:
     arm = any(h.arm for h in hidden) or bool({"mass", "load-dependent loss"} & set(trial.parameters))
     motion = str(rng.choice(motions))
     longest = max((h.seconds for h in hidden), default=0.0)
+    drive = DRIVES[rng.integers(len(DRIVES))]
+    if trial.group == "matching":
+        # Every formula of the plant is the model's, that of the base's friction too.
+        drive = replace(drive, algebraic_sign=False)
     setup = Setup(
-        drive=DRIVES[rng.integers(len(DRIVES))],
+        drive=drive,
         motion=motion,
         gravity=motion != "locked" and (arm or bool(rng.random() < 0.65)),
         rate=int(rng.choice(drawn, p=chances / chances.sum())),

@@ -155,7 +155,7 @@ def load_friction(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
 
 def hysteresis(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
     return {"maxwell": 0.05 * d.torques[0] * x, "maxwell_reach": _between(0.6, 1.5, r[0]) * _twist(d),
-            "maxwell_form": float(same)}  # fmt: skip
+            "maxwell_form": float(same), "maxwell_power": 12.0 * same}  # fmt: skip
 
 
 def bouc_wen(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:

@@ -23,8 +23,9 @@ against a locked output), an arm or a bare inertia as load, logs of 500 to 2000 
 by the case's name and seed.
 
 **Groups.** *clear*, *fair* and *faint* hide one effect of the catalogue with a formula that differs from
-the catalogue's, at a strength of 5, 2 and 0.7; *matching* the same at 5 with the catalogue's own formula,
-so that there are true numbers to recover; *pair* two effects at 4 each; *outside* something that the
+the catalogue's, at a strength of 5, 2 and 0.7; *matching* the same at 5 with the catalogue's own formula
+(and the base's own formula of friction, of which two of the drives otherwise have another), so that there
+are true numbers to recover; *pair* two effects at 4 each; *outside* something that the
 catalogue does not have, at 5; *missing* lacks a channel, *dirty* has spikes, gaps, clock jitter, missing
 stretches, a clock coarser than the samples or a saturated amplifier, both at 5. *null* hides nothing;
 *parameter* has one or two of the base's numbers off by 10 to 30 %.

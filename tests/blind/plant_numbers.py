@@ -105,6 +105,7 @@ class Numbers(NamedTuple):
     maxwell: float = 0.0
     maxwell_reach: float = 6e-4
     maxwell_form: float = 0.0
+    maxwell_power: float = 0.0  # how suddenly a slider slips; 0: at once
     duhem: float = 0.0
     duhem_stiffness: float = 5e3
     duhem_power: float = 1.0

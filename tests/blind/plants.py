@@ -128,7 +128,7 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     if p.maxwell > 0:
         for k in range(SLIDERS):
             share, far = slider(k, p)
-            tau += min(share, max(-share, sliders[k] + share / far * (twist - twist0)))
+            tau += slipped(sliders[k], twist - twist0, share, far, p)
     dy[8] = 0.0
     if p.duhem > 0:
         z = y[8]
@@ -205,6 +205,26 @@ def slider(k, p):
 
 
 @njit(cache=True)
+def slip_slope(force, way, share, far, p):
+    """Stiffness of a slider that slips by and by: none at its slip torque, all of it on the way back."""
+    if force * way <= 0:
+        return share / far
+    return share / far * (1.0 - min(1.0, abs(force) / share) ** p.maxwell_power)
+
+
+@njit(cache=True)
+def slipped(force, way, share, far, p):
+    """Torque of a slider after a little more twist."""
+    if p.maxwell_power == 0 or share == 0:
+        return min(share, max(-share, force + share / far * way))
+    a = slip_slope(force, way, share, far, p)
+    b = slip_slope(force + 0.5 * way * a, way, share, far, p)
+    c = slip_slope(force + 0.5 * way * b, way, share, far, p)
+    d = slip_slope(force + way * c, way, share, far, p)
+    return force + way * (a + 2 * b + 2 * c + d) / 6.0
+
+
+@njit(cache=True)
 def motor_at(motion, k, share, y):
     """Put the prescribed motor angle and speed into a state: cubic Hermite between two ticks."""
     last = min(k + 1, len(motion) - 1)
@@ -272,7 +292,7 @@ def integrate(angle, speed, motion, start, p, table, reach, gains, log):
                 rates(t, 0.0, y, torque, p, table, reach, bristle, sliders, twist0, a, out)
                 for j in range(SLIDERS):
                     share, far = slider(j, p)
-                    sliders[j] = min(share, max(-share, sliders[j] + share / far * (out[1] - twist0)))
+                    sliders[j] = slipped(sliders[j], out[1] - twist0, share, far, p)
                 twist0 = out[1]
             t += h
 
