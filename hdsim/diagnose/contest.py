@@ -117,6 +117,23 @@ def contest(
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
 
 
+def against_priors(bench: Bench, results: Sequence[tuple[str, Fit, Array]]) -> list[tuple[str, Fit, Array]]:
+    """Fits with what the priors have against their numbers shared out over their losses.
+
+    It counts as many independent samples as the base's numbers are squared prior spreads away from what they
+    were given as: a fit that has to bend the base needs as much more of the data on its side.
+    """
+    best = min(results, key=lambda result: float(result[2].sum()))[1]
+    power = _power(bench, bench.stacked(bench.residuals(best.predictions)))
+
+    def strain(found: Fit) -> float:
+        return sum(
+            ((float(t) - f.none) / f.prior) ** 2 for f, t in zip(found.frees, found.theta, strict=True)
+        )
+
+    return [(name, found, losses + power * strain(found) / len(losses)) for name, found, losses in results]
+
+
 def _from_given(bench: Bench, base: Fit, given: _Point, added: Added) -> list[Fit]:
     """The model with an effect, from where a linear fit at the numbers as given says that it lies."""
     (columns,) = designs(bench, given.state, given.predictions, [added])

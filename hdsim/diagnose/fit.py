@@ -24,8 +24,8 @@ from hdsim.diagnose.predict import PredictionError
 
 #: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which
 #: the model is further from linear; change of the whitened predictions, root mean square, for which a smaller
-#: step will do, and the smallest part of the largest step.
-STEP, SMALL_STEP, CHANGE, LEAST_STEP = 1e-1, 3e-2, 0.3, 3e-3
+#: step will do, and the smallest part of the largest step; times the step that a coefficient may go for that.
+STEP, SMALL_STEP, CHANGE, LEAST_STEP, MOST_STEP = 1e-1, 3e-2, 0.3, 3e-3, 10.0
 #: Prior spreads of an effect's coefficients (in units of their terms) and of the logarithm of its shapes.
 COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
 #: Ratio of posterior to prior spread above which the data are said not to determine a number.
@@ -39,7 +39,7 @@ ROUGHLY, ROUNDS, TIGHT = 3e-4, 2, 0.25
 FEWEST_DEGREES = 3.0
 #: Size of a direction, all columns of length 1, below which what they say of it may be their own error, and
 #: change of the whitened predictions along it, root mean square, below which it is the solver's.
-WEAK, HEARD = 0.05, 0.02
+WEAK, HEARD = 0.3, 0.006
 #: Part of a step's change that a Jacobian may get wrong and still be corrected instead of made anew, and of
 #: the residual that it may get wrong and stay as it is.
 FORETOLD, NEGLIGIBLE = 0.3, 0.01
@@ -131,6 +131,13 @@ class Vector:
             spreads += [COEFFICIENT_PRIOR] * len(added.coefficients) + [SHAPE_PRIOR] * len(added.shapes)
         return np.array(spreads)
 
+    def coefficients(self) -> NDArray[np.bool_]:
+        """Which numbers are coefficients of an effect, shape (p,)."""
+        kinds = [False] * len(self.frees)
+        for added in self.base.added[self.first :]:
+            kinds += [True] * len(added.coefficients) + [False] * len(added.shapes)
+        return np.array(kinds, dtype=bool)
+
     def lower(self) -> Array:
         """Lower bounds, shape (p,)."""
         bounds = np.where(self._stiff(), -math.expm1(3.0), [f.none - 3.0 for f in self.frees]).tolist()
@@ -147,7 +154,10 @@ class Vector:
         bounds = np.where(self._stiff(), -math.expm1(-3.0), [f.none + 3.0 for f in self.frees]).tolist()
         for added in self.base.added[self.first :]:
             bounds += ceilings(added)
-            bounds += [math.log(shape) + 3.0 for shape in added.shapes]
+            bounds += [
+                min(math.log(value) + 3.0, math.log(shape.most))
+                for value, shape in zip(added.shapes, added.fitting.shapes, strict=True)
+            ]
         return np.array(bounds)
 
     def steps(self, x: Array) -> Array:
@@ -311,14 +321,16 @@ class _Slopes:
         What is left of columns that cancel is mostly their own error, which would be taken for knowledge.
         """
         columns = self.exact(x)
-        lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        _, sizes, directions = np.linalg.svd(np.linalg.qr(columns / lengths, mode="r"))
-        weak = [v / lengths for v, size in zip(directions, sizes, strict=True) if size < WEAK]
+        lengths = np.linalg.norm(columns, axis=0)
+        seen = lengths > 0  # the others say nothing that could be wrong
+        _, sizes, directions = np.linalg.svd(np.linalg.qr(columns[:, seen] / lengths[seen], mode="r"))
+        weak = np.zeros((int(np.sum(sizes < WEAK)), len(x)))
+        weak[:, seen] = directions[sizes < WEAK] / lengths[seen]
         most = self._vector.steps(x)
-        weak = [d * float(np.min(most / np.maximum(np.abs(d), 1e-300))) for d in weak]
-        states = [self._vector.state(x + sign * d) for d in weak for sign in (1.0, -1.0)]
+        steps = [d * float(np.min(most / np.maximum(np.abs(d), 1e-300))) for d in weak]
+        states = [self._vector.state(x + sign * d) for d in steps for sign in (1.0, -1.0)]
         there = self._bench.predict_all(states)
-        for d, ahead, back in zip(weak, there[::2], there[1::2], strict=True):
+        for d, ahead, back in zip(steps, there[::2], there[1::2], strict=True):
             if ahead is None or back is None:
                 continue
             change = 0.5 * self._bench.trace(back, ahead)
@@ -398,7 +410,10 @@ def sensitivities(
     steps = vector.steps(x)
     if like is not None:
         size = np.sqrt(np.mean(like**2, axis=0))
-        steps[: len(size)] *= np.clip(CHANGE / np.maximum(size * steps[: len(size)], 1e-300), LEAST_STEP, 1.0)
+        # Effects are linear in their coefficients, so those may move further.
+        kinds = vector.coefficients()[: len(size)]
+        wanted = CHANGE / np.maximum(size * steps[: len(size)], 1e-300)
+        steps[: len(size)] *= np.clip(wanted, LEAST_STEP, np.where(kinds, MOST_STEP, 1.0))
     steps = steps[first:]
     states = []
     for k, step in enumerate(steps, start=first):

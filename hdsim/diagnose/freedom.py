@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Coefficient below which a compliance in series counts as none.
 STIFF = 1e-6
+#: Part of a shape's limit within which it stands there.
+LIMIT = 0.02
 #: Prior standard deviation of a torque's delay beside the motion, samples.
 DELAY_PRIOR = 1.0
 
@@ -83,6 +85,14 @@ class Added:
     coefficients: tuple[float, ...]
     shapes: tuple[float, ...] = ()
     orders: tuple[float, ...] = ()
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether a shape stands at the end of its range: what is fitted would rather be another effect."""
+        return any(
+            value <= shape.least * (1.0 + LIMIT) or value >= shape.most / (1.0 + LIMIT)
+            for shape, value in zip(self.fitting.shapes, self.shapes, strict=True)
+        )
 
     def settings(self) -> dict[str, Any]:
         """Values of the effect's fields."""

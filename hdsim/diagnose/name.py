@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.contest import contest
+from hdsim.diagnose.contest import REACHED, against_priors, contest
 from hdsim.diagnose.fit import Fit, settled
 from hdsim.diagnose.measured import Array
 from hdsim.diagnose.screen import Residual
@@ -33,6 +33,11 @@ SOFTER = 0.03
 BESIDE = 0.6
 #: Part of all that there is to explain beyond which two effects cannot have explained parts of their own.
 OVERLAP = 1.2
+#: Part of what an effect at the end of its range explains for one of no more freedom to be preferred.
+INSIDE = 0.8
+#: What another effect leaves beside the noise, in its units, to be seen to be wrong where the best one has
+#: reached the noise, in however few blocks of time.
+SEEN = 0.5
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
 SAME = 0.02
 #: The same for effects that are known to look alike, when neither reaches the noise.
@@ -46,7 +51,8 @@ class Named:
     Attributes:
         name: in the catalogue.
         fit: the model with it.
-        losses: shape (blocks,), power of each block's residual after the fit.
+        losses: shape (blocks,), power of each block's residual after the fit, with a share of what the priors
+            have against its numbers.
         group: effects that these data cannot tell from it, with the ratio of explained power.
         confidence: share of resampled records (over blocks) in which it, or its group, is best.
         share: of the residual, which its trace explained on the screen.
@@ -98,26 +104,31 @@ def name_effect(
     if softer and any(one.added.fitting.in_series for one in shortlist):
         # The re-fit may have taken any compliance in series for the drive's own.
         shortlist += [one for one in screening.ranked if one.added.fitting.in_series and one not in shortlist]
-    before = bench.block_powers(base.predictions)
     with bench.coarse():
         results = contest(bench, base, shortlist, residual, on_step)
     if not results:
         return None
+    *results, (_, _, before) = against_priors(
+        bench, [*results, ("", base, bench.block_powers(base.predictions))]
+    )
     results.sort(key=lambda result: float(result[2].sum()))
     explained = float((before - results[0][2]).sum())
     if explained <= 0:
         return None
-    results = _simplest_first(results, SAME * explained)
+    results = simplest_first(_inside(results, before), SAME * explained)
     name, found, losses = results[0]
+    explained = float((before - losses).sum())
     group = {}
     on_screen = {one.name: one for one in shortlist}
     noise = sum(bench.noise_powers.values())
-    most = OVERLAP * (float(before.sum()) - noise)
+    whole = float(before.sum()) - noise
     for other, rival, rest in results[1:]:
         difference = rest - losses
         spread = float(np.sqrt(len(difference)) * difference.std())
-        apart = explained + float((before - rest).sum()) < most
+        apart = explained + float((before - rest).sum()) < OVERLAP * whole
         if apart and beside(residual, on_screen[name], on_screen[other]):
+            continue
+        if float(losses.sum()) < REACHED * noise and float(rest.sum()) > (1.0 + SEEN) * noise:
             continue
         same = max(2.0 * spread, SAME * explained)
         if confusable(name, other):
@@ -143,7 +154,17 @@ def name_effect(
     )
 
 
-def _simplest_first(results: list[tuple[str, Fit, Array]], same: float) -> list[tuple[str, Fit, Array]]:
+def _inside(results: list[tuple[str, Fit, Array]], before: Array) -> list[tuple[str, Fit, Array]]:
+    """The results without those at the end of their range, if the best is and no freer one will do."""
+    best = results[0]
+    inside = [result for result in results if not result[1].state.added[-1].at_limit]
+    if not best[1].state.added[-1].at_limit or not inside or freedom(inside[0][1]) > freedom(best[1]):
+        return results
+    enough = float((before - inside[0][2]).sum()) > INSIDE * float((before - best[2]).sum())
+    return inside if enough else results
+
+
+def simplest_first(results: list[tuple[str, Fit, Array]], same: float) -> list[tuple[str, Fit, Array]]:
     """The results, the one of least freedom first of those that blocks of time cannot tell from the best."""
 
     def level(rest: Array) -> bool:

@@ -46,6 +46,26 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
     return result, predictions
 
 
+def kept(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> float:
+    """How far held-out data bear out what was added to the re-fitted model.
+
+    With the held-out residual r and the change d of its prediction, (|r|^2 - |r - d|^2) / |d|^2: what d
+    explains over what it would if it were all there, however much of it the held-out data excite. It is 1
+    where all of d is there and where nothing was added, 0 where half of d is, below where the gap widens.
+
+    Args:
+        bench: the measured series.
+        predictions: of all series, ``refit`` and ``after``.
+    """
+    found, promised = 0.0, 0.0
+    residuals = [bench.residuals(predictions[stage]) for stage in ("refit", "after")]
+    for series, before, after in zip(bench.series, *residuals, strict=True):
+        r, rest = before[series.hold] / series.sigma, after[series.hold] / series.sigma
+        found += float(r @ r - rest @ rest)
+        promised += float((r - rest) @ (r - rest))
+    return found / promised if promised > 0 else 1.0
+
+
 def _held(bench: Bench, channel: str) -> list[int]:
     return [k for k, s in enumerate(bench.series) if s.channel == channel and s.hold.any()]
 

@@ -181,12 +181,14 @@ def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
 def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:
     """Ask every name again; ``found.named`` is changed in place.
 
-    The last one was asked beside the others, and is so again only where they have changed since.
+    The last one was asked beside the others, and is so again only where they have changed since, or where it
+    has gone to the end of its range.
     """
     first = bench.power(current.predictions)
     k = 0
     while k < len(found.named):
-        if k == len(found.named) - 1 and bench.power(current.predictions) > (1.0 - NEWS) * first:
+        settled = bench.power(current.predictions) > (1.0 - NEWS) * first
+        if k == len(found.named) - 1 and settled and not current.state.added[k].at_limit:
             break
         own = found.named[k]
         added = list(current.state.added)

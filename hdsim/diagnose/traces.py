@@ -175,7 +175,7 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
     shapes = [
         replace(
             s, starts=tuple(v / ranges[s.over_range] for v in s.starts),
-            least=s.least / ranges[s.over_range], over_range="",
+            least=s.least / ranges[s.over_range], most=s.most / ranges[s.over_range], over_range="",
         )
         if s.over_range else s
         for s in fitting.shapes

@@ -19,7 +19,7 @@ from hdsim.diagnose.locate import Location
 from hdsim.diagnose.measured import Array, Record, record_from
 from hdsim.diagnose.name import LEVEL, Named
 from hdsim.diagnose.predict import LoadSource, PredictionError, predictors
-from hdsim.diagnose.prove import gaps
+from hdsim.diagnose.prove import gaps, kept
 from hdsim.diagnose.refit import Refit, refit, tie
 from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.search import Stage, search
@@ -28,7 +28,6 @@ from hdsim.diagnose.suspect import delays, suspicions
 from hdsim.diagnose.verdict import (
     DataProblem,
     FittedNumber,
-    Gap,
     Located,
     NamedEffect,
     Remainder,
@@ -46,6 +45,8 @@ if TYPE_CHECKING:
 STRUCTURED, ADEQUATE, OWN_ADEQUATE = 0.12, 0.9, 0.95
 #: The first of these in the own coordinate of an exact law.
 EXACTLY = 0.05
+#: How far held-out data must bear out what was added, see ``kept``.
+KEPT = 0.5
 #: Least relative fall of a held-out gap for the verdict ``parameter``.
 LEAST_FALL = 0.03
 
@@ -148,8 +149,11 @@ def diagnose(
     states = {"before": start, "refit": base.fit.state, "after": current.state}
     with step("prove", "proving on held-out data"):
         gap, predictions = gaps(bench, states)
-    # A name, or a curve, that does not hold on data that it has not seen is none.
-    unknown = (last.chance <= LEVEL and _misfit(named, last, explained)) or (bool(named) and not _proved(gap))
+    # A name, or a curve, that does not hold on data that it has not seen is none; nor is a name that fits at
+    # the end of its range alone.
+    unknown = last.chance <= LEVEL and _misfit(named, last, explained)
+    unknown = unknown or (bool(named) and kept(bench, predictions) < KEPT)
+    unknown = unknown or any(added.at_limit for added in current.state.added)
     rest_of = None if named or unknown else remainder(bench, current.predictions)
     curve: CurveFit | None = None
     if unknown:
@@ -160,7 +164,7 @@ def diagnose(
         with step("prove", "proving on held-out data"):
             if curve is not None:
                 gap, predictions = gaps(bench, states | {"after": curve.fit.state})
-                curve = curve if _proved(gap) else None
+                curve = curve if kept(bench, predictions) >= KEPT else None
             if curve is None:
                 gap, predictions = gaps(bench, states | {"after": current.state})
         current = curve.fit if curve is not None else current
@@ -253,11 +257,6 @@ def _misfit(named: Sequence[Named], last: Location, explained: float) -> bool:
             if signature.exact:
                 return last.structured > EXACTLY
     return last.structured > STRUCTURED and explained < needed
-
-
-def _proved(gap: Mapping[str, Gap]) -> bool:
-    """Whether the held-out gaps fall on the whole, in units of what was there."""
-    return sum((g.after**2 - g.refit**2) / max(g.refit**2, 1e-300) for g in gap.values()) < 0
 
 
 def _number(interval: Interval) -> FittedNumber:

@@ -7,6 +7,7 @@ diagnosis simulates each term once at its unit size and has the trace that the e
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -82,6 +83,7 @@ class Shape:
             the output, or ``motor_side_torque_nm``, if any.
         linear: the field is an angle or the like, whose neighbours lie at differences, not at ratios.
         least: what lies below is another effect's; divided like the starts.
+        most: the same for what lies above.
     """
 
     path: str
@@ -89,6 +91,7 @@ class Shape:
     over_range: str = ""
     linear: bool = False
     least: float = 0.0
+    most: float = math.inf
 
     def neighbours(self, value: float, times: int) -> tuple[float, float]:
         """Values on both sides at the half of the starts' distance, halved ``times`` times.
@@ -102,7 +105,7 @@ class Shape:
             gap = part * (self.starts[1] - self.starts[0])
             return value - gap, value + gap
         ratio = self.starts[1] / self.starts[0] if len(self.starts) > 1 else ALONE
-        return max(float(value / ratio**part), self.least), float(value * ratio**part)
+        return max(float(value / ratio**part), self.least), min(float(value * ratio**part), self.most)
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,8 @@ class FlexsplineStiffening(Effect):
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Inverse("stiffness_nm_per_rad", 1.0e5),),
-            (Shape("coefficient_per_nm", (0.7, 2.0, 6.0), "torque_nm"),),
+            # Taken up within less of the torque it would be a play.
+            (Shape("coefficient_per_nm", (0.7, 2.0, 6.0), "torque_nm", most=8.0),),
         ),
     )
 

@@ -81,7 +81,10 @@ class LugreFriction(Effect):
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Amplitude({"coulomb_nm": 0.02, "static_nm": 0.0201}), Amplitude({"static_nm": 0.02})),
-            (Shape("stribeck_velocity_rad_per_s", (2.0, 8.0)), Shape("stiffness_nm_per_rad", (6.0,))),
+            (
+                Shape("stribeck_velocity_rad_per_s", (2.0, 8.0), most=25.0),
+                Shape("stiffness_nm_per_rad", (6.0,)),
+            ),
             {"damping_nm_s_per_rad": 1e-3},
             cumulative=True,
         ),

@@ -49,7 +49,8 @@ class StribeckFriction(Effect):
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Amplitude({"extra_static_nm": 0.008}),),
-            (Shape("stribeck_velocity_rad_per_s", (1.5, 5.0, 20.0)),),
+            # Ten at most in the sources; a fall over more speed is another law of the viscous friction.
+            (Shape("stribeck_velocity_rad_per_s", (1.5, 5.0, 14.0), most=15.0),),
         ),
     )
 

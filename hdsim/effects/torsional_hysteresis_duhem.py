@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
 from hdsim.parts import Builder, Effect, Signature, State
 
@@ -55,20 +55,28 @@ class TorsionalHysteresisDuhem(Effect):
             "input_coulomb_viscous": "absent with the wave generator locked",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = tuple(
-        Fitting((Amplitude({"stiffness_nm_per_rad": 1e3 / twist, "saturation_torque_nm": 1.0}),))
-        for twist in (0.1, 0.4)
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"saturation_torque_nm": 1.0}),),
+            # Over less it would be a friction at the output, over more a spring.
+            (Shape("saturation_twist_mrad", (0.1, 0.4), least=0.02, most=0.6),),
+        ),
     )
 
     stiffness_nm_per_rad: float = Field(5000.0, gt=0)
     """Stiffness A at a reversal from rest, N m/rad."""
     saturation_torque_nm: float = Field(2.0, gt=0)
     """Torque A/alpha at which z saturates, N m: half of the loop's width in torque."""
+    saturation_twist_mrad: float | None = Field(None, gt=0)
+    """Twist 1/alpha of a branch, mrad; where it is given, A is the saturation torque over it."""
 
     def contribute(self, build: Builder) -> None:
         """Add the hysteresis torque parallel to the torsion spring."""
-        decay = self.stiffness_nm_per_rad / self.saturation_torque_nm
+        stiffness = self.stiffness_nm_per_rad
+        if self.saturation_twist_mrad is not None:
+            stiffness = 1e3 * self.saturation_torque_nm / self.saturation_twist_mrad
+        decay = stiffness / self.saturation_torque_nm
         state = State(
             "hysteresis_torque", "N m", 0.0, self.saturation_torque_nm, "torque of the Duhem hysteresis"
         )
-        build.element(duhem, [self.stiffness_nm_per_rad, decay], states=(state,))
+        build.element(duhem, [stiffness, decay], states=(state,))

@@ -39,7 +39,8 @@ class WaveGeneratorCompliance(Effect):
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Inverse("stiffness_nm_per_rad", 8.0),),
-            (Shape("coefficient_per_nm", (0.4, 1.2, 3.6), "motor_side_torque_nm"),),
+            # Taken up within less of the torque it would be a play.
+            (Shape("coefficient_per_nm", (0.4, 1.2, 3.6), "motor_side_torque_nm", most=8.0),),
         ),
     )
 

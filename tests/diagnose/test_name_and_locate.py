@@ -1,4 +1,5 @@
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import hdsim
 from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.locate import order_lines
 from hdsim.diagnose.measured import Record
+from hdsim.diagnose.name import simplest_first
 from hdsim.diagnose.predict import predictors
+from hdsim.diagnose.prove import kept
 from hdsim.diagnose.verdict import Verdict
 from hdsim.diagnose.workflow import diagnose, save
 from hdsim.errors import InputError
@@ -109,6 +112,29 @@ def test_a_cable_is_no_unbalance_though_that_explains_most_of_it(tmp_path):
 
     found = diagnose([rigid_record(12.0, extra=weight, seed=3)], scenario(tmp_path)).verdict
     assert [effect.name for effect in found.effects] == ["unbalance"]
+
+
+@pytest.mark.parametrize("there", [1.0, 0.5, 0.0, -0.2])
+def test_held_out_data_bear_out_the_part_of_a_change_that_is_there(tmp_path, there):
+    bench = Bench(predictors([rigid_record(8.0, noise=0.0)], -100.0))
+    (series,) = bench.series
+    wave = np.sin(np.arange(len(series.measured)))
+    prediction = series.measured + 3.0
+    found = {"refit": [prediction - there * wave], "after": [prediction + (1.0 - there) * wave]}
+    # |t w|^2 - |(t - 1) w|^2 = (2 t - 1) |w|^2
+    assert kept(bench, found) == pytest.approx(2.0 * there - 1.0, abs=0.02)
+
+
+def test_of_two_that_explain_the_same_the_simpler_one_has_the_name():
+    def result(name, free, losses):
+        added = SimpleNamespace(coefficients=(1.0,) * free, shapes=())
+        return name, SimpleNamespace(state=SimpleNamespace(added=[added])), np.array(losses)
+
+    free, simple = result("free", 2, [1.0, 2.0, 1.0, 2.0]), result("simple", 1, [1.5, 1.6, 1.6, 1.4])
+    worse = result("worse", 1, [2.0, 3.0, 2.0, 3.0])
+    assert [r[0] for r in simplest_first([free, simple, worse], 0.2)] == ["simple", "free", "worse"]
+    assert [r[0] for r in simplest_first([free, simple, worse], 0.05)] == ["free", "simple", "worse"]
+    assert [r[0] for r in simplest_first([free, worse], 0.2)] == ["free", "worse"]
 
 
 def test_missing_friction_is_named_where_the_base_has_none(tmp_path):

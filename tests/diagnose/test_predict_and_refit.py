@@ -1,19 +1,23 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from diagnose_bench import RATE, motion, rigid_record, scenario
 from scipy.interpolate import CubicSpline, PPoly
 
+from hdsim.actuation.loads import GravityArm
+from hdsim.diagnose.add import fitted_numbers
 from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import base_intervals, robust_covariance
-from hdsim.diagnose.freedom import Added, base_freedoms, state_of
+from hdsim.diagnose.fit import base_intervals, fit, robust_covariance
+from hdsim.diagnose.freedom import Added, Free, base_freedoms, state_of
 from hdsim.diagnose.measured import Record
 from hdsim.diagnose.predict import Predictor, plan_for, predictors
 from hdsim.diagnose.refit import refit, tie, with_delays
 from hdsim.diagnose.spline import smoothed
 from hdsim.diagnose.suspect import delays
 from hdsim.effects import catalogue
+from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.errors import InputError
 
 
@@ -131,6 +135,39 @@ def test_a_torque_that_is_stamped_late_or_early_does_not_bend_the_friction(tmp_p
     )
 
 
+def test_a_prior_stays_where_the_model_was_given():
+    free = Free("load.gravity.mass_kg", ("load.gravity.mass_kg",), 0.4, 10.0)
+    there = free.moved(math.log(1.5)).moved(-math.log(3.0))
+    assert there.value == pytest.approx(5.0)
+    assert there.at(there.none) == pytest.approx(10.0)
+
+
+def test_a_weight_that_adds_to_an_arm_is_not_told_from_its_mass(tmp_path):
+    # m g l sin(o) + g u cos(o + p): only the cosine's part of the unbalance is its own.
+    base = scenario(tmp_path, mesh="lumped")
+    gravity = GravityArm(mass_kg=4.0, centre_of_mass_m=0.3)
+    state = state_of(base.model_copy(update={"load": base.load.model_copy(update={"gravity": gravity})}))
+    record = rigid_record(6.0)
+    zeros = {"output_angle": record.channels["motor_angle"] / -100.0, "output_torque": 0.0 * record.time}
+    record = Record("r", record.time, {**record.channels, **zeros})
+    (fitting,) = (f for f in catalogue()["unbalance"].fittings if f.label == "output")
+    weight = Added("unbalance", fitting, (0.5, 0.8))
+    truth = replace(state, added=(weight,))
+    bench = Bench(predictors([record], -100.0))
+    rng = np.random.default_rng(1)
+    noises = {"motor_torque": 3e-3, "output_angle": 4e-6, "output_torque": 0.1}
+    for series, found in zip(bench.series, bench.predict(truth), strict=True):
+        series.noise = series.sigma = noises[series.channel]
+        series.measured = found + series.noise * rng.standard_normal(len(found))
+    frees = [free for free in base_freedoms(state, bench.channels) if "mass" in free.name]
+    found = fit(bench, truth, frees, prune=False)
+    spreads = np.sqrt(np.diag(found.covariance))
+    assert spreads[0] > 0.2  # of the mass: its prior's
+    assert spreads[1] < 0.3 < 2.0 < spreads[2]  # the coefficients of the cosine and of the sine
+    found = fit(bench, truth, [], prune=False)
+    assert np.sqrt(np.diag(found.covariance)).max() < 0.1
+
+
 def test_intervals_are_students_with_the_blocks_that_tell():
     rng = np.random.default_rng(5)
     blocks = np.repeat(np.arange(12), 40)
@@ -168,6 +205,30 @@ def test_a_locked_drive_tells_its_torque_constant_only_beside_a_second_torque(tm
     assert "motor_torque_gain" in free("motor_torque", locked=False)
     assert "motor_torque_gain" in free("motor_torque", "output_torque", locked=True)
     assert "motor_torque_gain" not in free("motor_torque", locked=True)
+
+
+def test_a_harmonics_phase_is_as_sure_as_its_ellipse_is_narrow():
+    harmonic = Fitting((Harmonic("output_kg_m", "output_phase_deg", 0.1),))
+
+    def half_width(covariance):
+        low, high = fitted_numbers(
+            Added("unbalance", harmonic, (3.0, 0.0)), np.array(covariance), np.zeros(0)
+        )["output_phase_deg"].interval
+        return (high - low) / 2.0
+
+    assert half_width([[0.01, 0.0], [0.0, 0.01]]) == pytest.approx(math.degrees(math.asin(0.2 / 3)), rel=1e-3)
+    # Of a vector that may be none, the direction is not known.
+    assert half_width([[3.0, 0.0], [0.0, 3.0]]) == 180.0
+    # One that is long and slanting reaches round the origin without holding it.
+    slanting = half_width([[4.0, 1.9], [1.9, 1.0]])
+    assert 90.0 < slanting < 180.0
+
+
+def test_an_effect_at_the_end_of_its_range_says_so():
+    (fitting,) = catalogue()["stribeck_friction"].fittings
+    (shape,) = fitting.shapes
+    for value, at_limit in ((5.0, False), (shape.most, True), (0.99 * shape.most, True)):
+        assert Added("stribeck_friction", fitting, (1.0,), (value,)).at_limit is at_limit
 
 
 @pytest.mark.parametrize("name", [name for name in catalogue() if name != "table"])

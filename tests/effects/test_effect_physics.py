@@ -237,6 +237,8 @@ def test_duhem_branch_is_the_exponential() -> None:
     assert np.allclose(z, 2 * (1 - np.exp(-2000 * 1e-3 * times)), atol=1e-7)
     slower = model.follow(k.TWIST, lambda t: 1e-5 * t, lambda t: 1e-5, 100 * times)[0]
     assert np.allclose(z, slower, atol=1e-6)
+    by_twist = Model(TorsionalHysteresisDuhem(saturation_torque_nm=2, saturation_twist_mrad=0.5))
+    assert np.allclose(by_twist.follow(k.TWIST, lambda t: 1e-3 * t, lambda t: 1e-3, times)[0], z, atol=1e-9)
 
 
 def test_backlash_widens_by_half_on_each_side() -> None:
