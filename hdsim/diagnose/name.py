@@ -123,6 +123,8 @@ def name_effect(
     noise = sum(bench.noise_powers.values())
     whole = float(before.sum()) - noise
     for other, rival, rest in results[1:]:
+        if rival.state.added[-1].at_limit and not found.state.added[-1].at_limit:
+            continue
         difference = rest - losses
         spread = float(np.sqrt(len(difference)) * difference.std())
         apart = explained + float((before - rest).sum()) < OVERLAP * whole

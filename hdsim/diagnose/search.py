@@ -187,8 +187,9 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
     first = bench.power(current.predictions)
     k = 0
     while k < len(found.named):
+        stuck = current.state.added[k].at_limit
         settled = bench.power(current.predictions) > (1.0 - NEWS) * first
-        if k == len(found.named) - 1 and settled and not current.state.added[k].at_limit:
+        if k == len(found.named) - 1 and settled and not stuck:
             break
         own = found.named[k]
         added = list(current.state.added)
@@ -217,7 +218,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
         same = named.name == own.name or own.name in named.group
         if same or now < (1.0 - SAME) * loss:
-            own = named if named.name == own.name or not same else own
+            own = named if named.name == own.name or not same or stuck else own
             if own is named:
                 # It was fitted last: back to its place.
                 fitted = named.fit.state.added[-1]
