@@ -217,7 +217,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             continue
         loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
         same = named.name == own.name or own.name in named.group
-        if same or now < (1.0 - SAME) * loss:
+        if same or stuck or now < (1.0 - SAME) * loss:
             own = named if named.name == own.name or not same or stuck else own
             if own is named:
                 # It was fitted last: back to its place.
