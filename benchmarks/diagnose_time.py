@@ -19,8 +19,8 @@ from rich.console import Console
 from rich.table import Table
 
 import hdsim
-from hdsim.diagnose.measured import Record
 from hdsim.diagnose.workflow import diagnose
+from hdsim.estimate.records import Record
 
 BASE = """
 name: benchmark of the diagnosis

@@ -39,7 +39,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
     "layout": ("hdsim.log.commands:layout", "Print a layout that shows a log in Foxglove."),
     "diagnose": (
-        "hdsim.diagnose.commands:diagnose",
+        "hdsim.tell.commands:diagnose",
         "Find what a model is missing against measured records.",
     ),
     "recover": ("hdsim.log.commands:recover", "Save what a damaged or unfinished log holds."),

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, Vector, at_present, correlation, fit, sensitivities
-from hdsim.diagnose.freedom import Added, State, scaled, signed
-from hdsim.diagnose.measured import Array
-from hdsim.diagnose.predict import PredictionError
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, designs
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, Vector, at_present, correlation, fit, sensitivities
+from hdsim.estimate.freedom import Added, State, scaled, signed
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Array
 
 #: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
 #: be fitted further, and from the numbers as given.

@@ -14,17 +14,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench, Series
-from hdsim.diagnose.fit import COEFFICIENT_PRIOR, Fit
-from hdsim.diagnose.freedom import Added, State, scaled
 from hdsim.diagnose.further import CurveFound
 from hdsim.diagnose.locate import Location, coordinates, hats
-from hdsim.diagnose.measured import Array
 from hdsim.diagnose.penalised import UNSEEN, Penalised, penalised, roughness
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.search import left_of
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects.table import COORDINATE_UNITS, Acting, Coordinate, TableCurve, cells
+from hdsim.estimate.bench import Bench, Series
+from hdsim.estimate.fit import COEFFICIENT_PRIOR, Fit
+from hdsim.estimate.freedom import Added, State, scaled
+from hdsim.estimate.records import Array
 
 #: Corners of a curve, of a curve over a period, and of the fine curve that says where corners are needed.
 CORNERS, ROUND_CORNERS, FINE = 14, 12, 80

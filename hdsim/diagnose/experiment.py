@@ -25,14 +25,14 @@ from typing import Any
 
 import numpy as np
 
-from hdsim.diagnose.bench import THREADS, Bench
 from hdsim.diagnose.experiments import Experiment, experiments, limits_of
-from hdsim.diagnose.fit import Fit, Vector, correlation
-from hdsim.diagnose.freedom import State
 from hdsim.diagnose.further import Candidate, NextExperiment
-from hdsim.diagnose.measured import CHANNELS, Array
-from hdsim.diagnose.predict import LEAD_IN_S
 from hdsim.errors import InputError
+from hdsim.estimate.bench import THREADS, Bench
+from hdsim.estimate.fit import Fit, Vector, correlation
+from hdsim.estimate.freedom import State
+from hdsim.estimate.predict import LEAD_IN_S
+from hdsim.estimate.records import CHANNELS, Array
 from hdsim.plot import units
 
 #: Rate at which experiments are simulated, Hz; the noise counts at the rate of the data.
@@ -249,8 +249,8 @@ def _simulated(
     """The channels that an experiment measures under a model, without its start; None when it fails."""
     from hdsim.actuation.command import Command
     from hdsim.actuation.loads import Load
-    from hdsim.diagnose.predict import MeasuredTorque, PredictionError
     from hdsim.drive.model import Model
+    from hdsim.estimate.predict import MeasuredTorque, PredictionError
     from hdsim.simulation.run import Run
 
     try:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.freedom import State
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.freedom import State
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData

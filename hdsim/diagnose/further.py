@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from hdsim.estimate.found import Part
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(use_attribute_docstrings=True, extra="forbid")
-
-
-class CurveFound(_Part):
+class CurveFound(Part):
     """A curve that explains what nothing in the catalogue does; in the scenario it is a ``table`` effect."""
 
     words: str
@@ -39,7 +35,7 @@ class CurveFound(_Part):
     """That share of every curve that was tried, by its words."""
 
 
-class Candidate(_Part):
+class Candidate(Part):
     """A scenario that was considered as the next experiment."""
 
     title: str
@@ -51,7 +47,7 @@ class Candidate(_Part):
     """That number over the one of a repetition of the measured record."""
 
 
-class NextExperiment(_Part):
+class NextExperiment(Part):
     """The experiment that would separate what these data cannot tell apart."""
 
     sentence: str

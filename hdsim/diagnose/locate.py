@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.diagnose.bench import Bench, Series
-from hdsim.diagnose.measured import Array
 from hdsim.diagnose.screen import Residual
+from hdsim.estimate.bench import Bench, Series
+from hdsim.estimate.records import Array
 
 #: Corners of the piecewise linear curves over a coordinate; of a finer one over the output's angle, where a
 #: catch or a stop is narrow.

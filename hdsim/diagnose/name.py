@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.contest import REACHED, against_priors, contest
-from hdsim.diagnose.fit import Fit, settled
-from hdsim.diagnose.measured import Array
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
 from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, settled
+from hdsim.estimate.records import Array
 
 #: Largest chance at which a search may name an effect.
 LEVEL = 0.02

@@ -11,8 +11,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.diagnose.measured import Array
 from hdsim.diagnose.screen import FOLDS, TOGETHER
+from hdsim.estimate.records import Array
 
 #: Weights of the penalty that are tried, as a multiple of the mean information on a value.
 WEIGHTS = tuple(10.0**k for k in range(-5, 4))

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.measured import Array
 from hdsim.diagnose.verdict import Remainder
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.records import Array
 
 #: Rest over the noise, root mean square, above which it isn't noise; below 1.25 where nothing is missing.
 EXCESS = 1.6

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.diagnose.measured import Array
+from hdsim.estimate.records import Array
 
 #: Folds of the cross-validation, and blocks that stay together in a fold.
 FOLDS, TOGETHER = 5, 2

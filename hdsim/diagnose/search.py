@@ -13,11 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import Fit, at_present, fit
-from hdsim.diagnose.freedom import State
 from hdsim.diagnose.locate import Line, Location, locate, order_lines
-from hdsim.diagnose.measured import Array
 from hdsim.diagnose.name import (
     LEAST_SHARE,
     LEVEL,
@@ -26,11 +22,15 @@ from hdsim.diagnose.name import (
     confusable,
     name_effect,
 )
-from hdsim.diagnose.predict import PredictionError
-from hdsim.diagnose.refit import align, reweigh, with_delays
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screening, screen
 from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.freedom import State
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Array
+from hdsim.estimate.refit import align, reweigh, with_delays
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7

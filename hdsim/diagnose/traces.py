@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.freedom import Added, State, number_at, signed
 from hdsim.diagnose.locate import Line, Place
-from hdsim.diagnose.measured import Array
-from hdsim.diagnose.predict import CARRIED, PredictionError
 from hdsim.diagnose.screen import Residual, Share, chance_of
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import WIDER, Amplitude, Fitting, Inverse, Periodic
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.freedom import Added, State, number_at, signed
+from hdsim.estimate.predict import CARRIED, PredictionError
+from hdsim.estimate.records import Array
 
 #: Orders of a periodic term that are taken from the spectra.
 MOST_ORDERS = 3

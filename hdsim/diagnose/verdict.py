@@ -4,31 +4,15 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from hdsim.diagnose.further import CurveFound, NextExperiment
+from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part
 
 VERSION = 1
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(use_attribute_docstrings=True, extra="forbid")
-
-
-class FittedNumber(_Part):
-    """A fitted number."""
-
-    value: float
-    """Its value, in the unit of its field's name."""
-    interval: tuple[float, float] | None = None
-    """95 % interval; null when the data do not determine it."""
-    start: float | None = None
-    """Its value in the base model, where it has one."""
-    tied_to: list[str] = []
-    """Numbers that these data cannot tell it from."""
-
-
-class NamedEffect(_Part):
+class NamedEffect(Part):
     """An effect that the model was missing."""
 
     name: str
@@ -49,28 +33,7 @@ class NamedEffect(_Part):
     """For each of them, what would tell the two apart."""
 
 
-class Gap(_Part):
-    """Root-mean-square difference of measurement and model in one channel, on held-out data."""
-
-    before: float
-    """Of the model as given, offsets removed."""
-    refit: float
-    """After its own numbers were fitted."""
-    after: float
-    """With the named effects."""
-    noise: float
-    """Standard deviation of the channel's noise."""
-    unit: str
-    """Unit of all of them."""
-    data: Literal["holdout"] = "holdout"
-    """What they were computed on."""
-    variation: float
-    """Standard deviation of the measured channel (of the transmission error, for the output's angle)."""
-    intervals: dict[str, tuple[float, float]] = {}
-    """95 % intervals of before, refit and after, from resampled blocks of time."""
-
-
-class Located(_Part):
+class Located(Part):
     """Where a residual lives."""
 
     stage: str
@@ -85,7 +48,7 @@ class Located(_Part):
     """Orders per wave-generator turn of its spectrum's peaks."""
 
 
-class Remainder(_Part):
+class Remainder(Part):
     """What is left of a channel, plainly more than noise, and lives in no coordinate that the data repeat."""
 
     record: str
@@ -100,18 +63,7 @@ class Remainder(_Part):
     """Its end."""
 
 
-class DataProblem(_Part):
-    """Something wrong with the data."""
-
-    record: str
-    channel: str
-    kind: str
-    severity: str
-    message: str
-    count: int = 0
-
-
-class Verdict(_Part):
+class Verdict(Part):
     """What a diagnosis found."""
 
     version: int = VERSION

@@ -6,35 +6,27 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hdsim.diagnose.add import fitted_numbers
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.check import Check, check_record
 from hdsim.diagnose.curve import CurveFit, fit_curve
-from hdsim.diagnose.fit import Fit, added_spreads, base_intervals
-from hdsim.diagnose.freedom import Interval, State, state_of
 from hdsim.diagnose.locate import Location
-from hdsim.diagnose.measured import Array, Record, record_from
 from hdsim.diagnose.name import LEVEL, Named
-from hdsim.diagnose.predict import LoadSource, PredictionError, predictors
-from hdsim.diagnose.prove import gaps, kept
-from hdsim.diagnose.refit import Refit, refit, tie
 from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.search import Stage, search
-from hdsim.diagnose.staging import staged
-from hdsim.diagnose.suspect import delays, suspicions
-from hdsim.diagnose.verdict import (
-    DataProblem,
-    FittedNumber,
-    Located,
-    NamedEffect,
-    Remainder,
-    Verdict,
-)
+from hdsim.diagnose.verdict import Located, NamedEffect, Remainder, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.check import Check, check_record
+from hdsim.estimate.fit import Fit, added_spreads, base_intervals
+from hdsim.estimate.found import DataProblem, FittedNumber
+from hdsim.estimate.freedom import Interval, State, state_of
+from hdsim.estimate.predict import LoadSource, PredictionError, predictors
+from hdsim.estimate.prove import gaps, kept
+from hdsim.estimate.records import Array, Record, record_from
+from hdsim.estimate.refit import Refit, refit, tie
+from hdsim.estimate.suspect import delays, suspicions
+from hdsim.estimate.write import fitted_numbers
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -312,39 +304,3 @@ def _located(stages: Sequence[Stage], most: int = 6) -> list[Located]:
             )
         found += list(best.values())
     return found
-
-
-def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
-    """Write ``verdict.json``, the scenario, the figures, the log and the report; returns the report's path.
-
-    Args:
-        diagnosis: what was found.
-        base: file of the base scenario.
-        out: directory; made when it is not there. Nothing is left in it when a file cannot be written.
-
-    Raises:
-        InputError: ``out`` cannot be written.
-    """
-    from hdsim.diagnose.add import scenario_text
-    from hdsim.diagnose.following import next_experiment
-    from hdsim.diagnose.record_out import write_compared
-    from hdsim.diagnose.report import write_report
-
-    out = Path(out)
-    verdict = diagnosis.verdict
-    with staged(out) as stage:
-        # What an earlier diagnosis found must not stay beside this one's verdict.
-        for name in ("found.yaml", "next.yaml", "curve.png"):
-            (out / name).unlink(missing_ok=True)
-        if verdict.verdict in ("effect", "parameter") or verdict.curve is not None:
-            state, freedoms = diagnosis.final.state, diagnosis.refit.freedoms
-            text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
-            (stage / "found.yaml").write_text(text, encoding="utf-8")
-            verdict.scenario = str(out / "found.yaml")
-        experiment = next_experiment(diagnosis, Path(base), out)
-        if experiment is not None:
-            (stage / "next.yaml").write_text(experiment, encoding="utf-8")
-        write_compared(diagnosis, stage)
-        (stage / "verdict.json").write_text(verdict.model_dump_json(indent=2), encoding="utf-8")
-        report = write_report(diagnosis, stage)
-    return out / report.name

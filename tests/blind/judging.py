@@ -17,10 +17,10 @@ from hidden import KNOWN
 from sensing import Log, measure, numbers
 
 import hdsim
-from hdsim.diagnose.measured import Record, record_from
 from hdsim.diagnose.verdict import Verdict
 from hdsim.diagnose.workflow import diagnose
 from hdsim.errors import InputError
+from hdsim.estimate.records import Record, record_from
 from hdsim.scenario import Scenario
 
 #: Most names that a group of indistinguishable effects may have to count.

@@ -11,10 +11,10 @@ from plants import spring_table
 from sensing import CHANNELS, Setup, measure, numbers, readings, truth
 from strength import strength
 
-from hdsim.diagnose.freedom import put, state_of
-from hdsim.diagnose.measured import Record
-from hdsim.diagnose.predict import Candidate, predictors
 from hdsim.effects import catalogue
+from hdsim.estimate.freedom import put, state_of
+from hdsim.estimate.predict import Candidate, predictors
+from hdsim.estimate.records import Record
 
 MOTIONS = ("swing", "moves", "chirp", "constant", "locked", "moves")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import hdsim
-from hdsim.diagnose.measured import Record
+from hdsim.estimate.records import Record
 from hdsim.scenario.model import Scenario
 
 RATE = 500.0

@@ -13,9 +13,9 @@ from mcap.writer import Writer
 
 from hdsim.cli import main
 from hdsim.diagnose import workflow
-from hdsim.diagnose.staging import staged
 from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
+from hdsim.tell.staging import staged
 
 N = 1500
 TORQUE = """ratio: -100

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hdsim.diagnose.check import check_record, explain, find_spikes, noise_floor
-from hdsim.diagnose.measured import Record, record_from
 from hdsim.errors import InputError
+from hdsim.estimate.check import check_record, explain, find_spikes, noise_floor
+from hdsim.estimate.records import Record, record_from
 from hdsim.recording import Column, Recording, Table
 
 RATIO = -100.0

@@ -8,18 +8,18 @@ import pytest
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.add import scenario_text
-from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.curve import Kind, effect, fit_curve, unit_traces
-from hdsim.diagnose.freedom import state_of
 from hdsim.diagnose.locate import Location, locate
-from hdsim.diagnose.measured import Record
 from hdsim.diagnose.penalised import penalised, roughness
-from hdsim.diagnose.predict import predictors
-from hdsim.diagnose.prove import gaps
-from hdsim.diagnose.refit import Refit, refit
 from hdsim.diagnose.screen import Residual
 from hdsim.effects.table import Table
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.freedom import state_of
+from hdsim.estimate.predict import predictors
+from hdsim.estimate.prove import gaps
+from hdsim.estimate.records import Record
+from hdsim.estimate.refit import Refit, refit
+from hdsim.estimate.write import scenario_text
 from hdsim.scenario.model import Scenario
 
 

@@ -5,9 +5,9 @@ from click.testing import CliRunner
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.commands import diagnose
 from hdsim.diagnose.verdict import Verdict
 from hdsim.recording import Column, Recording, Table
+from hdsim.tell.commands import diagnose
 
 
 def log(path: Path, **channels: np.ndarray) -> Path:

@@ -8,16 +8,16 @@ from diagnose_bench import BASE
 from ruamel.yaml import YAML
 
 import hdsim
-from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.experiment import _separated, propose
 from hdsim.diagnose.experiments import Limits, experiments
-from hdsim.diagnose.fit import Fit, fit
-from hdsim.diagnose.freedom import Added, signed, state_of
-from hdsim.diagnose.measured import Record
-from hdsim.diagnose.predict import predictors
-from hdsim.diagnose.refit import refit
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, fit
+from hdsim.estimate.freedom import Added, signed, state_of
+from hdsim.estimate.predict import predictors
+from hdsim.estimate.records import Record
+from hdsim.estimate.refit import refit
 from hdsim.scenario.model import Scenario
 
 NOISE = {"motor_angle": 1e-5, "output_angle": 4e-6, "motor_torque": 6e-3, "output_torque": 0.15}

@@ -6,15 +6,16 @@ import pytest
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.bench import Bench
 from hdsim.diagnose.locate import order_lines
-from hdsim.diagnose.measured import Record
 from hdsim.diagnose.name import simplest_first
-from hdsim.diagnose.predict import predictors
-from hdsim.diagnose.prove import kept
 from hdsim.diagnose.verdict import Verdict
-from hdsim.diagnose.workflow import diagnose, save
+from hdsim.diagnose.workflow import diagnose
 from hdsim.errors import InputError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.predict import predictors
+from hdsim.estimate.prove import kept
+from hdsim.estimate.records import Record
+from hdsim.tell.save import save
 
 
 def test_orders_2_and_2_02_are_told_apart_by_a_record_that_is_long_enough(tmp_path):

@@ -7,18 +7,18 @@ from diagnose_bench import RATE, motion, rigid_record, scenario
 from scipy.interpolate import CubicSpline, PPoly
 
 from hdsim.actuation.loads import GravityArm
-from hdsim.diagnose.add import fitted_numbers
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import base_intervals, fit, robust_covariance
-from hdsim.diagnose.freedom import Added, Free, base_freedoms, state_of
-from hdsim.diagnose.measured import Record
-from hdsim.diagnose.predict import Predictor, plan_for, predictors
-from hdsim.diagnose.refit import refit, tie, with_delays
-from hdsim.diagnose.spline import smoothed
-from hdsim.diagnose.suspect import delays
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.errors import InputError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import base_intervals, fit, robust_covariance
+from hdsim.estimate.freedom import Added, Free, base_freedoms, state_of
+from hdsim.estimate.predict import Predictor, plan_for, predictors
+from hdsim.estimate.records import Record
+from hdsim.estimate.refit import refit, tie, with_delays
+from hdsim.estimate.spline import smoothed
+from hdsim.estimate.suspect import delays
+from hdsim.estimate.write import fitted_numbers
 
 
 def test_smoothing_lets_the_acceleration_jump_where_friction_turns():
@@ -236,7 +236,7 @@ def test_every_effect_can_be_built_from_its_fittings(name):
     kind = catalogue()[name]
     assert kind.fittings
     for fitting in kind.fittings:
-        from hdsim.diagnose.freedom import signed
+        from hdsim.estimate.freedom import signed
 
         orders = (2.0, 12.0)
         count = len(signed(fitting, len(orders)))

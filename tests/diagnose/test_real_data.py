@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 import hdsim
-from hdsim.diagnose.measured import record_from
 from hdsim.diagnose.workflow import diagnose
+from hdsim.estimate.records import record_from
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"

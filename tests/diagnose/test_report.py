@@ -12,19 +12,21 @@ from diagnose_bench import rigid_record, scenario
 from rich.console import Console
 
 import hdsim
-from hdsim.diagnose.figures import worst_stretch
-from hdsim.diagnose.figures_where import LABELS, located_figure
-from hdsim.diagnose.following import NOTHING, candidates
 from hdsim.diagnose.further import Candidate, CurveFound, NextExperiment
 from hdsim.diagnose.locate import Place
-from hdsim.diagnose.report import write_report
-from hdsim.diagnose.terminal import Progress, show
-from hdsim.diagnose.verdict import DataProblem, FittedNumber, NamedEffect, Verdict
-from hdsim.diagnose.wording import farthest, headline, named_number, shown, sureness, unit_of
-from hdsim.diagnose.workflow import Diagnosis, diagnose, save
+from hdsim.diagnose.verdict import NamedEffect, Verdict
+from hdsim.diagnose.workflow import Diagnosis, diagnose
+from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.log import read_attachments
 from hdsim.log.info import info_log
 from hdsim.log.layout import split_path
+from hdsim.tell.figures import worst_stretch
+from hdsim.tell.figures_where import LABELS, located_figure
+from hdsim.tell.following import NOTHING, candidates
+from hdsim.tell.report import write_report
+from hdsim.tell.save import save
+from hdsim.tell.terminal import Progress, show
+from hdsim.tell.wording import farthest, headline, named_number, shown, sureness, unit_of
 
 NASTY = "<script>alert('x')</script> & co"
 

@@ -7,14 +7,14 @@ from test_real_data import KINOVA, ROOT
 
 import hdsim
 from hdsim.diagnose import workflow
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.check import check_record
-from hdsim.diagnose.freedom import state_of
-from hdsim.diagnose.measured import Record, record_from
-from hdsim.diagnose.predict import predictors
-from hdsim.diagnose.refit import refit
-from hdsim.diagnose.suspect import suspicions
 from hdsim.errors import InputError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.check import check_record
+from hdsim.estimate.freedom import state_of
+from hdsim.estimate.predict import predictors
+from hdsim.estimate.records import Record, record_from
+from hdsim.estimate.refit import refit
+from hdsim.estimate.suspect import suspicions
 
 TOTAL = 6.93e-5 + 0.50002 / 1e4
 

@@ -1,6 +1,6 @@
 """Suspicions that need the model: wrong scales, and logs of another drive, before either is sold as physics.
 
-Kinematics tell a wrong unit only where two channels show the same motion (`hdsim.diagnose.check`). A torque
+Kinematics tell a wrong unit only where two channels show the same motion (`hdsim.estimate.check`). A torque
 that stands alone is held against the model: its regression on the prediction gives one factor, and a factor
 near 1000, 180/pi, the ratio or -1 has a likely cause. The re-fitted numbers are held against the range in
 which a drive of the same size lies.
@@ -13,12 +13,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.check import Problem, explain, slope
-from hdsim.diagnose.freedom import Interval, State
-from hdsim.diagnose.measured import Array, Mask
-from hdsim.diagnose.predict import Predictor
-from hdsim.diagnose.refit import Refit
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.check import Problem, explain, slope
+from hdsim.estimate.freedom import Interval, State
+from hdsim.estimate.predict import Predictor
+from hdsim.estimate.records import Array, Mask
+from hdsim.estimate.refit import Refit
 
 #: Factor between measurement and model beyond which a number is suspect, by the last part of its name.
 #: Friction and damping differ more between two drives of a size, and with grease and temperature; a fitted

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from hdsim.diagnose.measured import LARGEST, Array, Mask, Record
+from hdsim.estimate.records import LARGEST, Array, Mask, Record
 
 Severity = Literal["info", "warning", "error"]
 

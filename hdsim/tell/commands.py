@@ -41,11 +41,11 @@ def diagnose(
     catalogue, adds them, and proves it on data that no fit has seen.
     """
     import hdsim
-    from hdsim.diagnose.measured import record_from
-    from hdsim.diagnose.staging import staged
-    from hdsim.diagnose.terminal import Progress, show
     from hdsim.diagnose.workflow import diagnose as run
-    from hdsim.diagnose.workflow import save
+    from hdsim.estimate.records import record_from
+    from hdsim.tell.save import save
+    from hdsim.tell.staging import staged
+    from hdsim.tell.terminal import Progress, show
 
     for path in holdout:
         if path.resolve() in {p.resolve() for p in measured}:

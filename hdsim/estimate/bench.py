@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.diagnose.check import noise_floor
-from hdsim.diagnose.measured import Array, Mask
-from hdsim.diagnose.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.errors import InputError
+from hdsim.estimate.check import noise_floor
+from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
+from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
-    from hdsim.diagnose.freedom import State
+    from hdsim.estimate.freedom import State
 
 #: Models that are simulated at the same time, in threads: the compiled solver lets go of the interpreter.
 THREADS = min(4, os.cpu_count() or 1)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from hdsim.console import console
-from hdsim.diagnose.tables import gap_rows
-from hdsim.diagnose.wording import KINDS, headline, sureness
+from hdsim.tell.tables import gap_rows
+from hdsim.tell.wording import KINDS, headline, sureness
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.freedom import State
-from hdsim.diagnose.measured import CHANNELS, Array
-from hdsim.diagnose.verdict import Gap
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.found import Gap
+from hdsim.estimate.freedom import State
+from hdsim.estimate.records import CHANNELS, Array
 
 #: Draws of blocks for the intervals.
 DRAWS = 500

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.freedom import Added, Free, Interval, State, ceilings, scaled, signed
-from hdsim.diagnose.measured import Array
-from hdsim.diagnose.predict import PredictionError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.freedom import Added, Free, Interval, State, ceilings, scaled, signed
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Array
 
 #: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which
 #: the model is further from linear; change of the whitened predictions, root mean square, for which a smaller

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from hdsim.diagnose.measured import Array
-from hdsim.diagnose.predict import LEAD_IN_S, Candidate, PredictionError
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Inverse, Periodic
 from hdsim.effects.table import Table
+from hdsim.estimate.predict import LEAD_IN_S, Candidate, PredictionError
+from hdsim.estimate.records import Array
 
 if TYPE_CHECKING:
     from hdsim.scenario import Scenario

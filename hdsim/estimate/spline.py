@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.diagnose.measured import Array
 from hdsim.errors import InputError
+from hdsim.estimate.records import Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from hdsim.diagnose.freedom import Added, Free, State, merge, number_at, put
-from hdsim.diagnose.measured import Array
-from hdsim.diagnose.verdict import FittedNumber
 from hdsim.effects._fitting import Amplitude, Harmonic, Inverse
+from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.freedom import Added, Free, State, merge, number_at, put
+from hdsim.estimate.records import Array
 
 
 def scenario_text(base: Path, state: State, freedoms: Sequence[Free], start: State, beside: Path) -> str:

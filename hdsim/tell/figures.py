@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.diagnose.prove import held_out_gap
-from hdsim.diagnose.wording import spoken, unit_of
+from hdsim.estimate.prove import held_out_gap
 from hdsim.plot import style, units
+from hdsim.tell.wording import spoken, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.bench import Series
     from hdsim.diagnose.further import CurveFound
-    from hdsim.diagnose.measured import Array, Mask
-    from hdsim.diagnose.verdict import Gap, Verdict
+    from hdsim.diagnose.verdict import Verdict
     from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.estimate.bench import Series
+    from hdsim.estimate.found import Gap
+    from hdsim.estimate.records import Array, Mask
 
 #: Most points of a drawn line.
 POINTS = 3000

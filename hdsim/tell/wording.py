@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hdsim.diagnose.name import LEVEL
-from hdsim.diagnose.verdict import FittedNumber, Gap, NamedEffect, Verdict
+from hdsim.diagnose.verdict import NamedEffect, Verdict
+from hdsim.estimate.found import FittedNumber, Gap
 from hdsim.plot import units
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hdsim.diagnose.verdict import FittedNumber, Verdict
-from hdsim.diagnose.wording import named_number, shown, spoken, unit_of
+from hdsim.diagnose.verdict import Verdict
+from hdsim.estimate.found import FittedNumber
+from hdsim.tell.wording import named_number, shown, spoken, unit_of
 
 GAP_HEAD = ("channel", "unit", "before", "re-fit", "after", "noise", "after/before", "after/noise")
 #: An interval that is wider than this many times its number does not tell it.

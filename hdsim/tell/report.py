@@ -9,12 +9,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hdsim.diagnose import figures
-from hdsim.diagnose.figures_where import located_figure
 from hdsim.diagnose.name import LEAST_SHARE, LEVEL
-from hdsim.diagnose.tables import GAP_HEAD, gap_rows, numbers_table, table
 from hdsim.diagnose.verdict import Verdict
-from hdsim.diagnose.wording import (
+from hdsim.tell import figures
+from hdsim.tell.figures_where import located_figure
+from hdsim.tell.tables import GAP_HEAD, gap_rows, numbers_table, table
+from hdsim.tell.wording import (
     KINDS,
     gains,
     headline,

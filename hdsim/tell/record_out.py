@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.diagnose.measured import CHANNELS
+from hdsim.estimate.records import CHANNELS
 from hdsim.recording import Column, Recording, Table
 
 if TYPE_CHECKING:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdsim.diagnose.experiment import propose
-from hdsim.diagnose.wording import title_of
 from hdsim.errors import InputError
+from hdsim.tell.wording import title_of
 
 if TYPE_CHECKING:
-    from hdsim.diagnose.fit import Fit
     from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.estimate.fit import Fit
 
 #: Share of resampled records below which a name is weak: then it is held against the model without it.
 WEAK = 0.8

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from hdsim.diagnose.measured import Array, Record
-from hdsim.diagnose.spline import TAIL_S, signal, smoothed
 from hdsim.errors import InputError, PhysicsError
+from hdsim.estimate.records import Array, Record
+from hdsim.estimate.spline import TAIL_S, signal, smoothed
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData

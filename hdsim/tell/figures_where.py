@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.diagnose.figures import AFTER, BEFORE, POINTS, REFIT, WIDTH
 from hdsim.diagnose.locate import coordinates, order_lines
-from hdsim.diagnose.wording import spoken
 from hdsim.plot import style, units
+from hdsim.tell.figures import AFTER, BEFORE, POINTS, REFIT, WIDTH
+from hdsim.tell.wording import spoken
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.bench import Bench
     from hdsim.diagnose.locate import Line, Place
-    from hdsim.diagnose.measured import Array
     from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.estimate.bench import Bench
+    from hdsim.estimate.records import Array
 
 #: Least share of a place that is drawn, most bars, and most panels beside them.
 LEAST, MOST_BARS, MOST_PANELS = 0.02, 8, 3

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnose.bench import Bench
-from hdsim.diagnose.fit import (
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import (
     Fit,
     Vector,
     at_present,
@@ -18,8 +18,8 @@ from hdsim.diagnose.fit import (
     robust_covariance,
     sensitivities,
 )
-from hdsim.diagnose.freedom import Free, Interval, State, base_freedoms, delay_freedoms
-from hdsim.diagnose.measured import Array
+from hdsim.estimate.freedom import Free, Interval, State, base_freedoms, delay_freedoms
+from hdsim.estimate.records import Array
 
 #: Part of what the number that can do most alone can do, for another to do as well.
 ALONE = 0.8

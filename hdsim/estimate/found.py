@@ -1,0 +1,58 @@
+"""What a fit and a check find, as data: what result files hold."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+
+class Part(BaseModel):
+    """A part of a result file."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True, extra="forbid")
+
+
+class FittedNumber(Part):
+    """A fitted number."""
+
+    value: float
+    """Its value, in the unit of its field's name."""
+    interval: tuple[float, float] | None = None
+    """95 % interval; null when the data do not determine it."""
+    start: float | None = None
+    """Its value in the base model, where it has one."""
+    tied_to: list[str] = []
+    """Numbers that these data cannot tell it from."""
+
+
+class Gap(Part):
+    """Root-mean-square difference of measurement and model in one channel, on held-out data."""
+
+    before: float
+    """Of the model as given, offsets removed."""
+    refit: float
+    """After its own numbers were fitted."""
+    after: float
+    """With the named effects."""
+    noise: float
+    """Standard deviation of the channel's noise."""
+    unit: str
+    """Unit of all of them."""
+    data: Literal["holdout"] = "holdout"
+    """What they were computed on."""
+    variation: float
+    """Standard deviation of the measured channel (of the transmission error, for the output's angle)."""
+    intervals: dict[str, tuple[float, float]] = {}
+    """95 % intervals of before, refit and after, from resampled blocks of time."""
+
+
+class DataProblem(Part):
+    """Something wrong with the data."""
+
+    record: str
+    channel: str
+    kind: str
+    severity: str
+    message: str
+    count: int = 0

@@ -1,0 +1,1 @@
+"""What a fit or a diagnosis found, told: report, figures, words, terminal."""

@@ -1,0 +1,46 @@
+"""Write what a diagnosis found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hdsim.estimate.write import scenario_text
+from hdsim.tell.following import next_experiment
+from hdsim.tell.record_out import write_compared
+from hdsim.tell.report import write_report
+from hdsim.tell.staging import staged
+
+if TYPE_CHECKING:
+    from hdsim.diagnose.workflow import Diagnosis
+
+
+def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
+    """Write ``verdict.json``, the scenario, the figures, the log and the report; returns the report's path.
+
+    Args:
+        diagnosis: what was found.
+        base: file of the base scenario.
+        out: directory; made when it is not there. Nothing is left in it when a file cannot be written.
+
+    Raises:
+        InputError: ``out`` cannot be written.
+    """
+    out = Path(out)
+    verdict = diagnosis.verdict
+    with staged(out) as stage:
+        # What an earlier diagnosis found must not stay beside this one's verdict.
+        for name in ("found.yaml", "next.yaml", "curve.png"):
+            (out / name).unlink(missing_ok=True)
+        if verdict.verdict in ("effect", "parameter") or verdict.curve is not None:
+            state, freedoms = diagnosis.final.state, diagnosis.refit.freedoms
+            text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
+            (stage / "found.yaml").write_text(text, encoding="utf-8")
+            verdict.scenario = str(out / "found.yaml")
+        experiment = next_experiment(diagnosis, Path(base), out)
+        if experiment is not None:
+            (stage / "next.yaml").write_text(experiment, encoding="utf-8")
+        write_compared(diagnosis, stage)
+        (stage / "verdict.json").write_text(verdict.model_dump_json(indent=2), encoding="utf-8")
+        report = write_report(diagnosis, stage)
+    return out / report.name
