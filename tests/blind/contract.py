@@ -51,7 +51,7 @@ class Case:
             the truth's formula is the catalogue's.
         setup: what was drawn: ``rate_hz``, ``encoder_step_over_noise``, ``sensors`` (``motor``, ``both``,
             ``torque sensor``, ``known load``), ``seconds``, ``records``, ``held`` (``stretches``, ``files``),
-            ``motion``, ``temperature`` (bool), ``formula`` (``catalogue``, ``other``), and what the family adds.
+            ``motion``, ``temperature`` (bool), ``formula`` (``catalogue``, ``other``), and more.
     """
 
     key: str
