@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
-from hdsim.estimate.check import noise_floor
 from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.estimate.records import Array, Mask
 
@@ -89,18 +88,10 @@ class Bench:
         held = stretch % 3 == 2 if split else np.full(n, own_record)
         usable = (record.time > SETTLE_S) & record.trusted[predictor.plan.motion]
         for channel in predictor.plan.channels:
-            good = usable & record.trusted[channel]
-            measured = record.filled(channel)
+            measured, trusted, noise = predictor.measured(channel)
+            good = usable & trusted
             self.series.append(
-                Series(
-                    index,
-                    channel,
-                    measured,
-                    good & ~held,
-                    good & held,
-                    self.blocks + block,
-                    noise_floor(record.channels[channel], record.trusted[channel]),
-                )
+                Series(index, channel, measured, good & ~held, good & held, self.blocks + block, noise)
             )
         self.blocks += count
 
@@ -314,12 +305,22 @@ class Bench:
         return found
 
     def weigh(self, residuals: Sequence[Array]) -> None:
-        """Set every series' ``sigma`` from its noise and from what is left of it."""
+        """Set every series' ``sigma`` from its noise and from what is left of its channel in training data.
+
+        A record that is held out has no residual that may be looked at: it takes its channel's of the others.
+        """
+        powers: dict[str, list[float]] = {}
+        rests: list[float | None] = []
         for series, residual in zip(self.series, residuals, strict=True):
-            rows = series.train
-            if len(residual) and rows.any():
-                rest = float(np.sqrt(np.mean(residual[rows] ** 2)))
-                series.sigma = max(float(np.hypot(series.noise, MODEL_NOISE * rest)), 1e-15)
+            seen = len(residual) > 0 and bool(series.train.any())
+            power = float(np.mean(residual[series.train] ** 2)) if seen else None
+            rests.append(power)
+            if power is not None:
+                powers.setdefault(series.channel, []).append(power)
+        for series, power in zip(self.series, rests, strict=True):
+            if power is None:
+                power = float(np.mean(powers.get(series.channel, [0.0])))
+            series.sigma = max(float(np.hypot(series.noise, MODEL_NOISE * np.sqrt(power))), 1e-15)
 
     def stacked(self, columns: Sequence[Array]) -> Array:
         """Training samples of all series under one another, divided by their sigma."""

@@ -1,10 +1,7 @@
 """Step 1, check the data: what is missing, wrong or suspect in a record, with the evidence.
 
-Noise is estimated from fourth differences, which a signal much slower than the sampling leaves near zero:
-for white noise of standard deviation s they have the standard deviation s sqrt(70), 70 being the sum of
-the squared binomial coefficients (Rice 1984, Annals of Statistics 12:1215, difference-based estimators).
-Spikes are found as Hampel's filter does, by the deviation from a running median (Hampel 1974, J. American
-Statistical Association 69:383).
+Noise: see ``hdsim.estimate.noise``. Spikes are found as Hampel's filter does, by the deviation from a running
+median (Hampel 1974, J. American Statistical Association 69:383).
 """
 
 from __future__ import annotations
@@ -16,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from hdsim.estimate.noise import noise_floor
 from hdsim.estimate.records import LARGEST, Array, Mask, Record
 
 Severity = Literal["info", "warning", "error"]
@@ -83,16 +81,6 @@ def check_record(record: Record, ratio: float) -> Check:
     _still(record, found)
     _units(record, ratio, found)
     return found
-
-
-def noise_floor(values: Array, trusted: Mask) -> float:
-    """Standard deviation of the white noise on a channel, in its unit (robust; 0 when there is none)."""
-    differences = np.diff(np.where(trusted, values, np.nan), 4)
-    differences = differences[np.isfinite(differences)]
-    if len(differences) < 10:
-        return 0.0
-    # 0.6745: the median of |x| of a standard normal.
-    return float(np.median(np.abs(differences)) / 0.6745 / math.sqrt(70.0))
 
 
 def _clock(record: Record, found: Check) -> None:

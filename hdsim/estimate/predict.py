@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hdsim.errors import InputError, PhysicsError
-from hdsim.estimate.records import Array, Record
+from hdsim.estimate.noise import noise_floor, quantisation_step, white_noise
+from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import TAIL_S, signal, smoothed
 
 if TYPE_CHECKING:
@@ -171,6 +172,27 @@ class Predictor:
         motion = self.motion.values(self.record.time + LEAD_IN_S)
         #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
         self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
+
+    def measured(self, channel: str) -> tuple[Array, Mask, float]:
+        """What a predicted channel is compared with: readings (n,), which of them count (n,), their noise.
+
+        With both encoders the output's angle is read beside the motor's at the same moment: what a jittering
+        clock, or the motor's encoder, puts on both falls out of their difference, the transmission error.
+        Where that has less noise, the motor's reading less its smooth motion is taken out of the output's.
+        """
+        record = self.record
+        values, trusted = record.filled(channel), record.trusted[channel]
+        noise = noise_floor(record.channels[channel], trusted)
+        if channel != "output_angle" or self.plan.motion != "motor_angle":
+            return values, trusted, noise
+        motor = record.filled("motor_angle")
+        both = trusted & record.trusted["motor_angle"]
+        beside = white_noise(values - motor / self.ratio, both)
+        step = max(quantisation_step(values[trusted]), quantisation_step(motor[both]) / abs(self.ratio))
+        beside = max(beside, step / np.sqrt(12.0))
+        if beside >= noise:
+            return values, trusted, noise
+        return values - (motor - self.motor_angle) / self.ratio, both, float(beside)
 
     def predict(self, candidate: Candidate) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdsim.errors import InputError
+from hdsim.estimate.noise import quantisation_step
 from hdsim.estimate.records import Array
 
 if TYPE_CHECKING:
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 #: Time after the record for which its last piece goes on, s.
 TAIL_S = 0.02
 #: Samples between knots that are tried.
-SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0)
+SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
+#: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
+STEPS_ALLOW = 1.1
 
 
 def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array, Array]:
@@ -25,16 +28,38 @@ def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array
 
     Generalised cross-validation (Craven and Wahba 1979, Numerische Mathematik 31:377) of uniform
     least-squares splines: coarse knots when the data are noisy, the interpolating spline when they are not.
+    The steps of a quantised reading are no white noise, and fine knots would follow them: of the splines that
+    leave no more than the steps allow, q / sqrt(12), the coarsest is taken where it is coarser.
 
     Args:
         time: shape (n,), s, strictly increasing.
         values: shape (n,).
         motion: the values are an angle, whose acceleration may jump where friction changes its sign.
     """
-    from scipy.interpolate import CubicSpline, PPoly, make_lsq_spline
+    from scipy.interpolate import CubicSpline, PPoly
+
+    best, chosen = best_spline(time, values)
+    if chosen is None:
+        exact = CubicSpline(time, values)
+        return np.asarray(exact.x), np.asarray(exact.c[::-1])
+    if motion:
+        jumping = _jumping(time, values, chosen)
+        if jumping is not None and _score(time, values, jumping) < best:
+            chosen = jumping
+    pieces_of = PPoly.from_spline(chosen)
+    keep = np.diff(pieces_of.x) > 0
+    breaks = np.concatenate([pieces_of.x[:-1][keep], [time[-1]]])
+    return breaks, np.asarray(pieces_of.c[::-1][:, keep])
+
+
+def best_spline(time: Array, values: Array) -> tuple[float, BSpline | None]:
+    """The least-squares spline that ``smoothed`` takes, with its score; None where none can be made."""
+    from scipy.interpolate import make_lsq_spline
 
     n = len(time)
+    allowed = STEPS_ALLOW * quantisation_step(values) / np.sqrt(12.0)
     best, chosen = np.inf, None
+    coarse: tuple[float, BSpline] | None = None
     rises = 0
     for spacing in SPACINGS:
         pieces = int((n - 1) / spacing)
@@ -47,24 +72,19 @@ def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array
             spline = make_lsq_spline(time, values, knots, k=3)
         except (ValueError, np.linalg.LinAlgError):
             continue  # a gap leaves a stretch between knots without samples
-        score = _score(time, values, spline)
+        rest = float(np.mean((values - spline(time)) ** 2))
+        score = rest / (1.0 - len(spline.c) / n) ** 2
+        if rest <= allowed**2:
+            coarse = score, spline
         if score < best:
             best, chosen, rises = score, spline, 0
         else:
             rises += 1
-            if rises >= 3:
+            if rises >= 3 and rest > allowed**2:
                 break
-    if chosen is None:
-        exact = CubicSpline(time, values)
-        return np.asarray(exact.x), np.asarray(exact.c[::-1])
-    if motion:
-        jumping = _jumping(time, values, chosen)
-        if jumping is not None and _score(time, values, jumping) < best:
-            chosen = jumping
-    pieces_of = PPoly.from_spline(chosen)
-    keep = np.diff(pieces_of.x) > 0
-    breaks = np.concatenate([pieces_of.x[:-1][keep], [time[-1]]])
-    return breaks, np.asarray(pieces_of.c[::-1][:, keep])
+    if coarse is not None and chosen is not None and len(coarse[1].c) < len(chosen.c):
+        return coarse
+    return best, chosen
 
 
 def _score(time: Array, values: Array, spline: BSpline) -> float:

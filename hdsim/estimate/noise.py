@@ -1,0 +1,67 @@
+"""Noise of a measured channel: white noise from differences, and the steps of a quantised sensor.
+
+White noise of standard deviation s has k-th differences of standard deviation s sqrt(C(2k, k)), which a
+signal much slower than the sampling leaves near zero (Rice 1984, Annals of Statistics 12:1215,
+difference-based estimators). The more slowly a record is sampled, the higher the order that is needed: the
+smallest of several orders is taken, as a signal can only add to each of them.
+
+A quantised reading cannot be known better than its step q allows: its error is uniform over the step, with
+standard deviation q / sqrt(12) (Widrow and Kollar 2008, Quantization Noise, ch. 5), even where the signal
+stands still within one step and all differences are zero.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hdsim.estimate.records import Array, Mask
+
+#: Orders of differences; beyond 8 they weigh only the highest frequencies.
+ORDERS = (4, 6, 8)
+#: Part of a step by which differences of a quantised channel may miss its multiples: rounding in a text file.
+ROUNDING = 0.05
+
+
+def noise_floor(values: Array, trusted: Mask) -> float:
+    """Standard deviation of a channel's noise, with that of its quantisation, in its unit (0: none).
+
+    Args:
+        values: shape (n,).
+        trusted: shape (n,), samples that count.
+    """
+    return max(white_noise(values, trusted), quantisation_step(values[trusted]) / math.sqrt(12.0))
+
+
+def quantisation_step(values: Array) -> float:
+    """Step q of which all differences between readings are multiples, in their unit; 0 where there is none.
+
+    Args:
+        values: shape (n,), trusted readings.
+    """
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > 1e-12 * float(np.max(np.abs(values), initial=0.0))]
+    if len(steps) < 2:
+        return 0.0
+    # The median of the smallest ones: a single one may have lost digits.
+    smallest = float(steps.min())
+    step = float(np.median(steps[steps < 1.5 * smallest]))
+    multiples = steps / step
+    missed = np.abs(multiples - np.round(multiples))
+    return step if float(np.quantile(missed, 0.99)) < ROUNDING else 0.0
+
+
+def white_noise(values: Array, trusted: Mask) -> float:
+    """Standard deviation of the white noise on a channel (robust; 0 when there is none)."""
+    found = []
+    marked = np.where(trusted, values, np.nan)
+    for order in ORDERS:
+        differences = np.diff(marked, order)
+        differences = differences[np.isfinite(differences)]
+        if len(differences) < 10:
+            break
+        # 0.6745: the median of |x| of a standard normal.
+        spread = float(np.median(np.abs(differences))) / 0.6745
+        found.append(spread / math.sqrt(math.comb(2 * order, order)))
+    return min(found, default=0.0)
