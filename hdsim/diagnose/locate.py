@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,12 +73,14 @@ class Location:
         lines: peaks of the order spectra by falling share.
         structured: share of the whole weighed residual that the best coordinate of each channel explains.
         chance: probability to find such a share in a residual without structure.
+        powers: whitened power of each channel's residual.
     """
 
     places: list[Place] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     structured: float = 0.0
     chance: float = 1.0
+    powers: dict[str, float] = field(default_factory=dict)
 
 
 def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location:
@@ -97,6 +99,7 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
         own = [k for k, s in enumerate(bench.series) if s.channel == channel and s.record < bench.training]
         rows = np.isin(numbers, own)
         power = float(np.sum(residual.values[rows] ** 2))
+        found.powers[channel] = power
         if power <= 0:
             continue
         lines = order_lines(bench, residuals, channel)
@@ -122,6 +125,25 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
         by_chance = np.sum(np.maximum(np.stack(draws), 0.0), axis=0)
         found.chance = float((1 + np.sum(by_chance >= explained)) / (1 + len(by_chance)))
     return found
+
+
+def curves_over(bench: Bench, residuals: Sequence[Array], wanted: Collection[tuple[str, str]]) -> Array:
+    """Columns of smooth curves over coordinates of channels, shape (rows, k): what a law may leave there.
+
+    Args:
+        bench: the measured series.
+        residuals: of every series, SI units.
+        wanted: coordinate and channel of every curve.
+    """
+    columns: list[Array] = [np.zeros((len(bench.stacked_blocks()), 0))]
+    for channel in bench.channels:
+        names = {coordinate for coordinate, own in wanted if own == channel}
+        if not names:
+            continue
+        own = [k for k, s in enumerate(bench.series) if s.channel == channel and s.record < bench.training]
+        lines = order_lines(bench, residuals, channel) if "wave_generator_angle" in names else []
+        columns += [x for name, x, _ in _designs(bench, own, lines, residuals) if name in names]
+    return np.hstack(columns)
 
 
 def _model_torque(bench: Bench, series: Series, residuals: Sequence[Array]) -> Array | None:
@@ -166,7 +188,7 @@ def coordinates(bench: Bench, series: Series, residuals: Sequence[Array]) -> dic
     return found
 
 
-def order_lines(bench: Bench, residuals: list[Array], channel: str, most: int = 6) -> list[Line]:
+def order_lines(bench: Bench, residuals: Sequence[Array], channel: str, most: int = 6) -> list[Line]:
     """Strongest orders per wave-generator turn in a channel's residual.
 
     The amplitude at an order is the least-squares one over the measured angle, so the speed may vary.

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdsim.diagnose.contest import REACHED, against_priors, contest
+from hdsim.diagnose.evidence import CandidateEvidence
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
 from hdsim.effects import catalogue
@@ -58,6 +59,9 @@ class Named:
         share: of the residual, which its trace explained on the screen.
         chance: of the search that found it.
         alternatives: fits of the others on the shortlist.
+        candidates: all that were fitted, the best first, as evidence.
+        gain: part of the first pass's structure that it explained; set by the search.
+        beyond: part of its trace's share that curves over the others' coordinates leave it; likewise.
     """
 
     name: str
@@ -68,6 +72,9 @@ class Named:
     share: float
     chance: float
     alternatives: dict[str, Fit]
+    candidates: list[CandidateEvidence]
+    gain: float = 1.0
+    beyond: float = 1.0
 
 
 def name_effect(
@@ -153,6 +160,30 @@ def name_effect(
             o: settled(bench, each, len(base.state.added)) if o in group else each
             for o, each, _ in results[1:]
         },
+        [_as_evidence(result, results[0], before, whole, on_screen[result[0]]) for result in results],
+    )
+
+
+def _as_evidence(
+    result: tuple[str, Fit, Array],
+    best: tuple[str, Fit, Array],
+    before: Array,
+    whole: float,
+    screened: Screened,
+) -> CandidateEvidence:
+    """A fitted candidate as plain data."""
+    name, found, losses = result
+    added = found.state.added[-1]
+    difference, explained = losses - best[2], max(float((before - best[2]).sum()), 1e-300)
+    return CandidateEvidence(
+        name=name,
+        label=added.fitting.label,
+        screened=screened.share.share,
+        explained=float((before - losses).sum()) / max(whole, 1e-300),
+        behind=float(difference.sum()) / explained,
+        behind_spread=float(np.sqrt(len(difference)) * difference.std()) / explained,
+        numbers=freedom(found),
+        at_limit=added.at_limit,
     )
 
 

@@ -54,6 +54,8 @@ class Residual:
     """
 
     def __init__(self, values: Array, base: Array, blocks: NDArray[np.int64], seed: int = 0) -> None:
+        #: What was taken out, as given.
+        self.base = base
         scale = np.linalg.norm(base, axis=0)
         base = base[:, scale > 0] / scale[scale > 0]
         vectors, singular, _ = np.linalg.svd(base, full_matrices=False) if base.size else (base, [], None)

@@ -8,18 +8,17 @@ more is found, and all is asked once more when they have explained something.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdsim.diagnose.locate import Line, Location, locate, order_lines
+from hdsim.diagnose.locate import Line, Location, curves_over, locate, order_lines
 from hdsim.diagnose.name import (
     LEAST_SHARE,
     LEVEL,
     SAME,
     Named,
-    confusable,
     name_effect,
 )
 from hdsim.diagnose.screen import Residual
@@ -34,12 +33,10 @@ from hdsim.estimate.refit import align, reweigh, with_delays
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7
-#: Part of a channel's first residual that a later effect must explain; more where it can look like what an
-#: effect that is there already leaves, because the true formula is never quite the catalogue's.
-LATER_SHARE, LATER_ALIKE = 0.02, 0.1
-#: The first of these for a sharp line in a shaft's angle where no other effect has one, which no formula's
-#: misfit leaves, and the part of what is left of its channel that it must hold.
-LINE_SHARE, LINE_LEFT = 0.005, 0.03
+#: Part of what a channel lacked at first that a later effect must explain: where no smooth curve over the
+#: coordinates of the effects before it does (a sharp line in an order spectrum is that small), and where one
+#: would, because no formula is exact.
+BEYOND_GAIN, WITHIN_GAIN = 0.005, 0.1
 #: Part of what is left by which it must have fallen for the last name to be asked again.
 NEWS = 0.1
 
@@ -52,6 +49,7 @@ class Stage:
 
     title: str
     location: Location
+    power: float
     screening: Screening | None = None
     named: Named | None = None
 
@@ -99,31 +97,18 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     title = "refit" if not found.named else f"with {found.named[-1].name}"
     during("locate", f"locating what is left {title}")
     found.left = left_of(bench, current)
-    stage = Stage(title, locate(bench, found.left, bench.residuals(current.predictions)))
+    stage = Stage(title, locate(bench, found.left, bench.residuals(current.predictions)), found.left.power)
     found.stages.append(stage)
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
-    sharp = _sharp(stage.location.lines, found.named)
-    if found.named and not _more_could(bench, base, current, sharp):
+    if found.named and not _more_could(bench, base, current):
         return None
-    tell = during("screen", "screening the catalogue")
-    stage.screening = screen(
-        bench, current.state, found.left, stage.location.lines,
-        places=stage.location.places, on_step=tell,
-    )  # fmt: skip
-    ranked = stage.screening.ranked
-    if not ranked or stage.screening.chance > LEVEL:
-        return None
-    if not found.named and ranked[0].share.share < LEAST_SHARE:
-        return None
-    tell = during("fit", "fitting the shortlist")
-    places = stage.location.places
-    named = name_effect(
-        bench, current, stage.screening, found.left,
-        coordinate=places[0].coordinate if places else "", on_step=tell,
-    )  # fmt: skip
-    if named is None or not _matters(bench, base, current, named, found.named, sharp):
+    for beyond in (True, False) if found.named else (False,):
+        named = _one_more(bench, base, current, found, stage, beyond, during)
+        if named is not None:
+            break
+    else:
         return None
     stage.named = named
     found.named.append(named)
@@ -132,48 +117,74 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     reweigh(bench, current)
     if len(found.named) > 1:
         tell = during("again", "asking each name again beside the others")
-        current = _again(bench, base, _together(bench, current), found, tell)
+        current = _again(bench, base, together(bench, current), found, tell)
         align(bench, current)
         reweigh(bench, current)
     return current
 
 
-def _sharp(lines: Sequence[Line], named: list[Named]) -> set[str]:
-    """Channels in which a line holds much of what is left, and no named effect but a sensor's can have it."""
-    if any(catalogue()[one.name].signature.orders for one in named if one.name != "sensors"):
-        return set()
-    return {line.channel for line in lines if line.share >= LINE_LEFT and line.order >= 1.0}
+def _one_more(
+    bench: Bench,
+    base: Fit,
+    current: Fit,
+    found: Search,
+    stage: Stage,
+    beyond: bool,
+    during: Callable[[str, str], Step],
+) -> Named | None:
+    """The best further effect; ``beyond``: of what no curve over the present ones' coordinates explains.
+
+    No formula is ever exact, and what the present ones leave in their own coordinates would be taken for
+    another effect. An effect that shows there only must explain much more.
+    """
+    left = beyond_curves(bench, current, found.left, found.named) if beyond else found.left
+    places = stage.location.places
+    tell = during("screen", "screening the catalogue")
+    screening = screen(bench, current.state, left, stage.location.lines, places=places, on_step=tell)
+    if stage.screening is None or screening.chance < stage.screening.chance:
+        stage.screening = screening
+    if not screening.ranked or screening.chance > LEVEL:
+        return None
+    if not found.named and screening.ranked[0].share.share < LEAST_SHARE:
+        return None
+    tell = during("fit", "fitting the shortlist")
+    coordinate = places[0].coordinate if places else ""
+    named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell)
+    if named is None:
+        return None
+    alone = next(one for one in screening.ranked if one.name == named.name)
+    own = found.left.share(alone.columns).share * found.left.power
+    named.beyond = float(np.clip(alone.share.share * left.power / own, 0.0, 1.0)) if own > 0 else 0.0
+    named.gain = _gain(bench, base, current, named.fit)
+    least = BEYOND_GAIN if beyond else WITHIN_GAIN
+    return named if not found.named or named.gain >= least else None
 
 
-def _more_could(bench: Bench, base: Fit, now: Fit, sharp: Container[str]) -> bool:
+def beyond_curves(bench: Bench, current: Fit, left: Residual, named: Sequence[Named]) -> Residual:
+    """A residual without what smooth curves over the coordinates of the named effects explain."""
+    homes = set()
+    for one in named:
+        signature = catalogue()[one.name].signature
+        homes |= {(signature.lives_in[0], channel) for channel in signature.channels}
+    curves = curves_over(bench, bench.residuals(current.predictions), homes)
+    return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
+
+
+def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
+    """Largest part of what a channel lacked at first, beyond its noise, that a fit explains more."""
+    first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
+    noise = bench.noise_powers
+    return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
+
+
+def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
     """Whether more than noise is left in some channel, enough for one more effect to matter."""
     first, last = (bench.channel_powers(each.predictions) for each in (base, now))
     noise = bench.noise_powers
-    return any(last[c] - noise[c] >= (LINE_SHARE if c in sharp else LATER_SHARE) * first[c] for c in first)
+    return any(last[c] - noise[c] >= BEYOND_GAIN * (first[c] - noise[c]) for c in first)
 
 
-def _matters(
-    bench: Bench, base: Fit, before: Fit, new: Named, others: list[Named], sharp: Container[str] = ()
-) -> bool:
-    """Whether an effect explains enough beside what was there first, in one channel at least."""
-    alike = any(
-        (confusable(new.name, other.name) and _channel(new.name) == _channel(other.name))
-        or new.name in other.group
-        for other in others
-    )
-    least = dict.fromkeys(bench.channels, LATER_ALIKE if alike else LATER_SHARE)
-    if new.fit.state.added[-1].orders:
-        least |= {c: LINE_SHARE for c in least if c in sharp}
-    first, last, now = (bench.channel_powers(each.predictions) for each in (base, before, new.fit))
-    return not others or max(last[c] - now[c] - least[c] * first[c] for c in first) >= 0
-
-
-def _channel(name: str) -> str:
-    """The channel in which an effect shows most."""
-    return catalogue()[name].signature.channels[0]
-
-
-def _together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
+def together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
     """All numbers fitted together: the base's and those of all effects."""
     return fit(bench, state or found.state, at_present(found), prune=False, beside=found.beside)
 
@@ -195,7 +206,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         added = list(current.state.added)
         others = added[:k] + added[k + 1 :]
         try:
-            without = _together(bench, current, replace(current.state, added=tuple(others)))
+            without = together(bench, current, replace(current.state, added=tuple(others)))
         except (PredictionError, np.linalg.LinAlgError):
             k += 1
             continue
@@ -210,7 +221,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         if screening.ranked and screening.chance <= LEVEL:
             named = name_effect(bench, without, screening, left, on_step=tell)
         rest = found.named[:k] + found.named[k + 1 :]
-        if named is None or not _matters(bench, base, without, named, rest, _sharp(lines, rest)):
+        if named is None or (rest and _gain(bench, base, without, named.fit) < BEYOND_GAIN):
             # The others explain what it did.
             found.named.pop(k)
             current = without
@@ -223,10 +234,11 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
                 # It was fitted last: back to its place.
                 fitted = named.fit.state.added[-1]
                 state = replace(named.fit.state, added=(*others[:k], fitted, *others[k:]))
-                current = _together(bench, named.fit, state)
+                current = together(bench, named.fit, state)
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
+            own.gain, own.beyond = found.named[k].gain, found.named[k].beyond
             found.named[k] = own
         k += 1
     return current

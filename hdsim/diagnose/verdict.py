@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis as data: what ``verdict.json`` holds. Version 1."""
+"""The verdict of a diagnosis as data: what ``verdict.json`` holds. Version 2."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
+from hdsim.diagnose.decide import Reason
 from hdsim.diagnose.further import CurveFound, NextExperiment
 from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part
 
-VERSION = 1
+VERSION = 2
 
 
 class NamedEffect(Part):
@@ -20,7 +21,7 @@ class NamedEffect(Part):
     title: str = ""
     """The field's term for it."""
     confidence: float = Field(ge=0, le=1)
-    """Share of resampled records in which it, or its group, is the best."""
+    """Probability that it, or its group, is right; calibrated on blind cases."""
     chance: float = Field(ge=0, le=1)
     """Probability that the whole search finds such a share where nothing is missing."""
     explained: float
@@ -90,9 +91,12 @@ class Verdict(Part):
     not_tried: dict[str, str] = {}
     """Effects of the catalogue that could not be tried, with the reason."""
     curve: CurveFound | None = None
-    """For ``unknown``: what is left as a curve over the coordinate that explains it best."""
+    """What is left as a curve over the coordinate that explains it best: for ``unknown`` all of it, beside
+    names what they leave."""
     remainder: Remainder | None = None
     """For ``unknown``: what is left without a place, as what happens once."""
+    because: list[Reason] = []
+    """Every rule that was asked, with what was seen and its limit."""
     next_experiment: NextExperiment | None = None
     """What to measure next, where these data leave names that they cannot tell apart."""
     scenario: str | None = None

@@ -5,15 +5,18 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from hdsim.diagnose.collect import collect
 from hdsim.diagnose.curve import CurveFit, fit_curve
-from hdsim.diagnose.locate import Location
-from hdsim.diagnose.name import LEVEL, Named
+from hdsim.diagnose.decide import Decision, decide
+from hdsim.diagnose.evidence import Evidence
+from hdsim.diagnose.name import Named
 from hdsim.diagnose.remainder import remainder
-from hdsim.diagnose.search import Stage, search
-from hdsim.diagnose.verdict import Located, NamedEffect, Remainder, Verdict
+from hdsim.diagnose.rules import RULES
+from hdsim.diagnose.search import Search, Stage, search, together
+from hdsim.diagnose.verdict import Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
@@ -22,7 +25,7 @@ from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.estimate.freedom import Interval, State, state_of
 from hdsim.estimate.predict import LoadSource, PredictionError, predictors
-from hdsim.estimate.prove import gaps, kept
+from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record, record_from
 from hdsim.estimate.refit import Refit, refit, tie
 from hdsim.estimate.suspect import delays, suspicions
@@ -32,25 +35,18 @@ if TYPE_CHECKING:
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
 
-#: Share of the weighed residual that must be structured for ``unknown``, and the part of all structure that
-#: the named effects must explain to be believed; more where they leave most in their own coordinate.
-STRUCTURED, ADEQUATE, OWN_ADEQUATE = 0.12, 0.9, 0.95
-#: The first of these in the own coordinate of an exact law.
-EXACTLY = 0.05
-#: How far held-out data must bear out what was added, see ``kept``.
-KEPT = 0.5
-#: Least relative fall of a held-out gap for the verdict ``parameter``.
-LEAST_FALL = 0.03
+#: Part of a curve's promise that held-out data must show: nearer to all of it than to none.
+HALF = 0.5
+#: Least part of the structure that is said to follow another shape than its law's.
+LEAST_REST = 0.02
 
 
 @dataclass
 class Diagnosis:
-    """Everything that a diagnosis found; ``verdict`` is its summary.
-
-    ``explained`` is the part of all structure in the re-fitted model's residual that the names explain.
-    """
+    """Everything that a diagnosis found; ``verdict`` is its summary, and rests on ``evidence`` alone."""
 
     verdict: Verdict
+    evidence: Evidence
     checks: list[Check]
     bench: Bench
     refit: Refit
@@ -58,7 +54,6 @@ class Diagnosis:
     named: list[Named]
     final: Fit
     start: State
-    explained: float = 0.0
     predictions: dict[str, list[Array]] = field(default_factory=dict)
 
 
@@ -133,86 +128,94 @@ def diagnose(
 
     with running:
         found = search(bench, base.fit, during)
-    current, stages, named, left = found.fit, found.stages, found.named, found.left
-    explained = bench.power(base.fit.predictions) - bench.power(current.predictions)
-    last = stages[-1].location
-    rest = last.structured * left.power
-    explained /= max(explained + rest, 1e-300)
-    states = {"before": start, "refit": base.fit.state, "after": current.state}
+    states = {"before": start, "refit": base.fit.state, "after": found.fit.state}
     with step("prove", "proving on held-out data"):
         gap, predictions = gaps(bench, states)
-    # A name, or a curve, that does not hold on data that it has not seen is none; nor is a name that fits at
-    # the end of its range alone.
-    unknown = last.chance <= LEVEL and _misfit(named, last, explained)
-    unknown = unknown or (bool(named) and kept(bench, predictions) < KEPT)
-    unknown = unknown or any(added.at_limit for added in current.state.added)
-    rest_of = None if named or unknown else remainder(bench, current.predictions)
+    evidence = collect(bench, base, found, gap, predictions)
+    decision = decide(evidence)
+    current, named = found.fit, [found.named[k] for k in decision.names]
+    if len(named) < len(found.named):
+        # What is not believed is not in the model either.
+        current = _only(bench, base, found, decision.names)
+    unknown = decision.kind == "unknown"
     curve: CurveFit | None = None
-    if unknown:
-        # What explains only a part is not added; the curve of all that is missing is.
-        current = base.fit
+    place = (found.stages[0] if unknown else found.stages[-1]).location
+    if unknown or (named and evidence.left_chance <= RULES.chance):
+        # What has no name, or what the names leave of their own, is a curve.
         with step("curve", "fitting the curve of what has no name"):
-            curve = fit_curve(bench, base.fit, stages[0].location, on_step=tell)
+            curve = fit_curve(bench, current, place, on_step=tell)
+    if unknown and curve is not None:
         with step("prove", "proving on held-out data"):
-            if curve is not None:
-                gap, predictions = gaps(bench, states | {"after": curve.fit.state})
-                curve = curve if kept(bench, predictions) >= KEPT else None
-            if curve is None:
-                gap, predictions = gaps(bench, states | {"after": current.state})
+            _, there = gaps(bench, states | {"after": curve.fit.state})
+            curve = curve if borne_out(bench, there)[0] >= HALF else None
         current = curve.fit if curve is not None else current
-    fell = any(g.refit < (1.0 - LEAST_FALL) * g.before for g in gap.values())
+    if current is not found.fit:
+        with step("prove", "proving on held-out data"):
+            gap, predictions = gaps(bench, states | {"after": current.state})
     intervals = [i for i in base_intervals(current, base.freedoms) if i.determined]
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)
     moved = [i for i in intervals if i.moved]
     off = moved
-    if fell and not (moved or named or unknown or rest_of):
+    if decision.kind == "parameter" and not moved:
         off = tie(bench, base.before, current, intervals)
+        if not off:
+            decision.kind = "nothing"
     common: dict[str, Any] = {
         "parameters": {i.name: _number(i) for i in intervals},
         "moved": [i.name for i in off],
         "gap": gap,
-        "located": _located(stages),
+        "located": _located(found.stages),
         "data_problems": [DataProblem(**vars(problem)) for problem in problems],
-        "not_tried": stages[0].screening.skipped if stages[0].screening else {},
+        "not_tried": found.stages[0].screening.skipped if found.stages[0].screening else {},
+        "because": decision.because,
+        "curve": curve.found() if curve is not None else None,
         "seconds": seconds,
     }
-    if unknown:
-        verdict = _without_a_name(stages, named, curve, common)
-    elif rest_of is not None:
-        verdict = _without_a_place(rest_of, common)
+    if unknown and (evidence.laws or evidence.rest is None or evidence.rest.times_noise <= RULES.rest):
+        verdict = _without_a_name(found.stages, evidence, common)
+    elif unknown:
+        verdict = _without_a_place(bench, found.fit, common)
     elif named:
-        effects = _effects(named, current)
+        effects = _effects(named, decision, current)
         words = " and ".join(_words(effect) for effect in effects)
-        verdict = Verdict(
-            verdict="effect", sentence=f"The model is missing {words}.", effects=effects, **common
-        )
-    elif off and fell:
+        sentence = f"The model is missing {words}.{_rest_words(found.stages[-1], evidence)}"
+        verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, **common)
+    elif decision.kind == "parameter":
         verdict = _numbers_off(off, common, sure=bool(moved))
     else:
         verdict = Verdict(verdict="nothing", sentence="The data show nothing that the model lacks.", **common)
     if doubts:
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
-    return Diagnosis(verdict, checks, bench, base, stages, named, current, start, explained, predictions)
+    return Diagnosis(verdict, evidence, checks, bench, base, found.stages, named, current, start, predictions)
 
 
-def _without_a_name(
-    stages: Sequence[Stage], named: Sequence[Named], curve: CurveFit | None, common: Mapping[str, Any]
-) -> Verdict:
+def _only(bench: Bench, base: Refit, found: Search, believed: Sequence[int]) -> Fit:
+    """The model with the believed effects only, fitted anew."""
+    if not believed:
+        return base.fit
+    added = tuple(found.fit.state.added[k] for k in believed)
+    return together(bench, found.fit, replace(found.fit.state, added=added))
+
+
+def _without_a_name(stages: Sequence[Stage], evidence: Evidence, common: Mapping[str, Any]) -> Verdict:
     place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
+    nearest = ", ".join(law.name.replace("_", " ") for law in evidence.laws)
+    said = f"; nearest: {nearest}, {100 * evidence.explained:.0f} % of the structure" if nearest else ""
     return Verdict(
         verdict="unknown",
-        sentence="Something is missing that nothing in the catalogue explains: "
+        sentence="Something is missing that nothing in the catalogue explains well enough to be named: "
         f"{100 * place.share:.0f} % of what is left of {place.channel} is a function of "
-        f"{place.coordinate.replace('_', ' ')}.",
-        suspects={one.name: round(one.share, 3) for one in named},
-        curve=curve.found() if curve is not None else None,
+        f"{place.coordinate.replace('_', ' ')}{said}.",
+        suspects={law.name: round(law.gain, 3) for law in evidence.laws},
         **common,
     )
 
 
-def _without_a_place(rest: Remainder, common: Mapping[str, Any]) -> Verdict:
+def _without_a_place(bench: Bench, last: Fit, common: Mapping[str, Any]) -> Verdict:
+    rest = remainder(bench, last.predictions)
+    assert rest is not None  # the evidence has said so
     return Verdict(
         verdict="unknown",
         sentence=f"Something is missing that nothing in the catalogue explains: {rest.channel} of "
@@ -224,6 +227,16 @@ def _without_a_place(rest: Remainder, common: Mapping[str, Any]) -> Verdict:
     )
 
 
+def _rest_words(last: Stage, evidence: Evidence) -> str:
+    """What the names leave, with its place; nothing where it may be chance."""
+    left = 1.0 - evidence.explained
+    if evidence.left_chance > RULES.chance or left < LEAST_REST or not last.location.places:
+        return ""
+    place = last.location.places[0]
+    coordinate = place.coordinate.replace("_", " ")
+    return f" {100 * left:.0f} % of the structure follows another shape, over the {coordinate}."
+
+
 def _numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:
     changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
     said = f"numbers of the model are off: {', '.join(changes)}."
@@ -232,34 +245,17 @@ def _numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bo
     return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
 
 
-def _misfit(named: Sequence[Named], last: Location, explained: float) -> bool:
-    """Whether the names explain too little to be believed.
-
-    Args:
-        named: the named effects.
-        last: where what they leave lives.
-        explained: part of all structure that they explain.
-    """
-    needed = ADEQUATE
-    place = last.places[0]
-    for one in named:
-        signature = catalogue()[one.name].signature
-        if place.coordinate == signature.lives_in[0] and place.channel in signature.channels:
-            needed = OWN_ADEQUATE
-            if signature.exact:
-                return last.structured > EXACTLY
-    return last.structured > STRUCTURED and explained < needed
-
-
 def _number(interval: Interval) -> FittedNumber:
     bounds = (interval.low, interval.high) if interval.determined else None
     return FittedNumber(value=interval.value, interval=bounds, start=interval.start, tied_to=interval.tied_to)
 
 
-def _effects(named: Sequence[Named], final: Fit) -> list[NamedEffect]:
+def _effects(named: Sequence[Named], decision: Decision, final: Fit) -> list[NamedEffect]:
     known = catalogue()
     found = []
-    for one, (added, covariance, shapes) in zip(named, added_spreads(final), strict=True):
+    chances = [decision.confidence[k] for k in decision.names]
+    spreads = added_spreads(final)
+    for one, confidence, (added, covariance, shapes) in zip(named, chances, spreads, strict=True):
         confused = known[one.name].signature.confused_with
         found.append(
             NamedEffect(
@@ -267,7 +263,7 @@ def _effects(named: Sequence[Named], final: Fit) -> list[NamedEffect]:
                 title=" ".join(
                     [known[one.name].title, f"({added.fitting.label})" if added.fitting.label else ""]
                 ).strip(),
-                confidence=one.confidence,
+                confidence=confidence,
                 chance=one.chance,
                 explained=one.share,
                 parameters=fitted_numbers(added, covariance, shapes),

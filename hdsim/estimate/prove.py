@@ -46,24 +46,31 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
     return result, predictions
 
 
-def kept(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> float:
-    """How far held-out data bear out what was added to the re-fitted model.
+def borne_out(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> tuple[float, float]:
+    """How much of what was added to the re-fitted model shows in held-out data, with its standard error.
 
-    With the held-out residual r and the change d of its prediction, (|r|^2 - |r - d|^2) / |d|^2: what d
-    explains over what it would if it were all there, however much of it the held-out data excite. It is 1
-    where all of d is there and where nothing was added, 0 where half of d is, below where the gap widens.
+    With the held-out residual r and the change d of its prediction, the slope of r over d: 1 where all of d
+    is there (and where nothing was added), 0 where none is. The error is clustered over blocks of time: data
+    that hardly excite the change say so by a large one. Infinite where they do not at all.
 
     Args:
         bench: the measured series.
         predictions: of all series, ``refit`` and ``after``.
     """
-    found, promised = 0.0, 0.0
     residuals = [bench.residuals(predictions[stage]) for stage in ("refit", "after")]
+    moments, powers = np.zeros(bench.blocks), np.zeros(bench.blocks)
     for series, before, after in zip(bench.series, *residuals, strict=True):
-        r, rest = before[series.hold] / series.sigma, after[series.hold] / series.sigma
-        found += float(r @ r - rest @ rest)
-        promised += float((r - rest) @ (r - rest))
-    return found / promised if promised > 0 else 1.0
+        if not len(before):
+            continue
+        r, d = before[series.hold] / series.sigma, (before - after)[series.hold] / series.sigma
+        moments += np.bincount(series.block[series.hold], r * d, bench.blocks)
+        powers += np.bincount(series.block[series.hold], d * d, bench.blocks)
+    total, count = float(powers.sum()), int(np.sum(powers > 0))
+    if total == 0.0 or count < 2:
+        return 1.0, float("inf")
+    slope = float(moments.sum()) / total
+    away = moments - slope * powers
+    return slope, float(np.sqrt(np.sum(away**2) * count / (count - 1))) / total
 
 
 def _held(bench: Bench, channel: str) -> list[int]:

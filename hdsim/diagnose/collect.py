@@ -1,0 +1,124 @@
+"""The evidence of a search, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hdsim.diagnose.evidence import (
+    Evidence,
+    HeldOutEvidence,
+    LawEvidence,
+    PlaceEvidence,
+    RestEvidence,
+    StageEvidence,
+)
+from hdsim.diagnose.locate import Location
+from hdsim.diagnose.name import Named
+from hdsim.diagnose.search import Search, Stage
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.found import Gap
+from hdsim.estimate.prove import borne_out
+from hdsim.estimate.records import Array
+from hdsim.estimate.refit import Refit
+
+#: Places of a stage that are kept.
+PLACES = 12
+
+
+def collect(
+    bench: Bench,
+    base: Refit,
+    found: Search,
+    gap: Mapping[str, Gap],
+    predictions: Mapping[str, Sequence[Array]],
+) -> Evidence:
+    """All that a verdict may rest on.
+
+    Args:
+        bench: the measured series.
+        base: the re-fit.
+        found: what the search found.
+        gap: held-out gaps of the model as given, re-fitted and with all effects.
+        predictions: of all series by these three models.
+    """
+    last = found.stages[-1].location
+    explained = bench.power(base.fit.predictions) - bench.power(found.fit.predictions)
+    left = last.structured * found.left.power
+    slope, spread = borne_out(bench, predictions) if found.named else (1.0, 0.0)
+    return Evidence(
+        stages=[_stage(stage) for stage in found.stages],
+        laws=[
+            _law(one, added.at_limit, found.stages)
+            for one, added in zip(found.named, found.fit.state.added, strict=True)
+        ],
+        explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
+        left=last.structured,
+        left_chance=last.chance,
+        held=HeldOutEvidence(slope=slope, spread=min(spread, 1e6)),
+        rest=_rest(bench, found.fit.predictions),
+        fell=max((1.0 - g.refit / g.before for g in gap.values() if g.before > 0), default=0.0),
+        moved=[i.name for i in base.moved],
+    )
+
+
+def _stage(stage: Stage) -> StageEvidence:
+    location = stage.location
+    return StageEvidence(
+        title=stage.title,
+        power=stage.power,
+        structured=location.structured,
+        structured_chance=location.chance,
+        chance=stage.screening.chance if stage.screening else 1.0,
+        places=[
+            PlaceEvidence(
+                coordinate=place.coordinate,
+                channel=place.channel,
+                share=place.share,
+                power=place.share * location.powers[place.channel],
+            )
+            for place in location.places[:PLACES]
+        ],
+        candidates=stage.named.candidates if stage.named else [],
+        named=stage.named.name if stage.named else "",
+    )
+
+
+def _law(one: Named, at_limit: bool, stages: Sequence[Stage]) -> LawEvidence:
+    first, last = (_own(one.name, stage.location) for stage in (stages[0], stages[-1]))
+    return LawEvidence(
+        name=one.name,
+        group=list(one.group),
+        chance=one.chance,
+        sampled=one.confidence,
+        gain=one.gain,
+        beyond=one.beyond,
+        own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
+        at_limit=at_limit,
+    )
+
+
+def _own(name: str, location: Location) -> float:
+    """Whitened power of a residual that lives in an effect's own coordinate, in its channels."""
+    signature = catalogue()[name].signature
+    found: dict[str, float] = {}
+    for place in location.places:
+        if place.coordinate == signature.lives_in[0] and place.channel in signature.channels:
+            power = place.share * location.powers[place.channel]
+            found[place.channel] = max(found.get(place.channel, 0.0), power)
+    return sum(found.values())
+
+
+def _rest(bench: Bench, predictions: Sequence[Array]) -> RestEvidence | None:
+    """The training channel that is left with most beyond its noise."""
+    worst: RestEvidence | None = None
+    for series, residual in zip(bench.series, bench.residuals(predictions), strict=True):
+        if series.record >= bench.training or not series.train.any() or series.noise <= 0:
+            continue
+        times = float(np.sqrt(np.mean((residual[series.train] / series.noise) ** 2)))
+        if worst is None or times > worst.times_noise:
+            name = bench.predictors[series.record].record.name
+            worst = RestEvidence(record=name, channel=series.channel, times_noise=times)
+    return worst

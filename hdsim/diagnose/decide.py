@@ -1,0 +1,137 @@
+"""The verdict from the evidence: a pure function of it and of the rules.
+
+Every name is a hypothesis whose log odds of being right are the sum of what each piece of evidence says
+(Good 1950, Probability and the Weighing of Evidence); a name is given where it is more likely right than the
+rules ask. Where something is there and no name is, it is ``unknown``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from hdsim.diagnose.evidence import Evidence
+from hdsim.diagnose.rules import RULES, Rules
+from hdsim.estimate.found import Part
+
+Kind = Literal["nothing", "parameter", "effect", "unknown"]
+
+
+class Reason(Part):
+    """One rule with what was seen."""
+
+    rule: str
+    """What is asked."""
+    of: str = ""
+    """Of which effect; empty: of the whole."""
+    seen: float
+    """What was seen."""
+    limit: float | None = None
+    """The rule's number, where it is a limit."""
+    odds: float | None = None
+    """What it adds to the logarithm of the odds, where it weighs."""
+    holds: bool
+    """Whether it speaks for the verdict."""
+
+
+class Decision(Part):
+    """What the evidence amounts to."""
+
+    kind: Kind
+    """The verdict."""
+    names: list[int] = []
+    """Which of the evidence's effects are believed."""
+    confidence: list[float] = []
+    """Probability that each of the evidence's effects is right, itself or its group."""
+    because: list[Reason] = []
+    """Every rule that was asked, with what was seen."""
+
+
+def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
+    """What the evidence amounts to.
+
+    Args:
+        evidence: all that was found out.
+        rules: the numbers by which it is weighed.
+    """
+    because: list[Reason] = []
+    confidence = [probability(evidence, k, rules, because) for k in range(len(evidence.laws))]
+    names = [k for k, p in enumerate(confidence) if p >= rules.believed]
+    for k, p in enumerate(confidence):
+        name = evidence.laws[k].name
+        because.append(
+            Reason(rule="likely enough for a name", of=name, seen=p, limit=rules.believed, holds=k in names)
+        )
+    if names:
+        return Decision(kind="effect", names=names, confidence=confidence, because=because)
+    found = bool(evidence.laws)
+    structured = evidence.left_chance <= rules.chance and evidence.left >= rules.structured
+    left = evidence.rest.times_noise if evidence.rest is not None else 0.0
+    for rule, seen, limit, holds in (
+        ("structure is left by chance", evidence.left_chance, rules.chance, structured),
+        ("part of what is left that is structure", evidence.left, rules.structured, structured),
+        ("what is left, in units of the noise", left, rules.rest, left > rules.rest),
+    ):
+        because.append(Reason(rule=rule, seen=seen, limit=limit, holds=holds))
+    if found or structured or left > rules.rest:
+        return Decision(kind="unknown", confidence=confidence, because=because)
+    fell = evidence.fell >= rules.fall
+    because.append(
+        Reason(rule="the re-fit closes a held-out gap", seen=evidence.fell, limit=rules.fall, holds=fell)
+    )
+    kind: Kind = "parameter" if fell else "nothing"
+    return Decision(kind=kind, confidence=confidence, because=because)
+
+
+def probability(evidence: Evidence, k: int, rules: Rules, because: list[Reason]) -> float:
+    """Probability that an effect of the evidence, or its group, is right.
+
+    Args:
+        evidence: all that was found out.
+        k: which effect.
+        rules: the weights.
+        because: reasons are appended.
+    """
+    total = rules.odds
+    for name, seen, weight in weighed(evidence, k, rules):
+        total += weight
+        because.append(Reason(rule=name, of=evidence.laws[k].name, seen=seen, odds=weight, holds=weight >= 0))
+    return 1.0 / (1.0 + math.exp(-total))
+
+
+def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, float]]:
+    """Each piece of evidence on an effect: what it is, what was seen, its weight in log odds."""
+    law = evidence.laws[k]
+    found = [
+        (
+            "part of the structure that the names explain",
+            evidence.explained,
+            rules.explained * (_log_odds(evidence.explained) - _log_odds(rules.explained_even)),
+        ),
+        ("held-out data show the promised change", evidence.held.slope, rules.held * _held(evidence, rules)),
+        ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
+    ]
+    if law.at_limit:
+        found.append(("a number stands at the end of its range", 1.0, rules.limit))
+    if k > 0:
+        found.append(("one more effect", float(k), rules.later))
+        found.append(
+            (
+                "what it explains beyond smooth curves over the others' coordinates",
+                law.beyond,
+                rules.beyond * _log_odds(law.beyond),
+            )
+        )
+    return found
+
+
+def _held(evidence: Evidence, rules: Rules) -> float:
+    """Log odds of "all of the promised change is there" against "none is", by its held-out slope."""
+    held = evidence.held
+    variance = held.spread**2 + rules.held_mismatch**2
+    return float(min(max((2.0 * held.slope - 1.0) / (2.0 * variance), -rules.held_most), rules.held_most))
+
+
+def _log_odds(part: float, least: float = 0.02) -> float:
+    part = min(max(part, least), 1.0 - least)
+    return math.log(part / (1.0 - part))

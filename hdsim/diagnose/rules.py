@@ -1,0 +1,53 @@
+"""The numbers that turn evidence into a verdict: few, each with its meaning and what calibrated it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from hdsim.estimate.found import Part
+
+
+def _rule(value: float, unit: str, meaning: str, by: str) -> Any:
+    return Field(value, description=meaning, json_schema_extra={"unit": unit, "calibrated_by": by})
+
+
+class Rules(Part):
+    """Rules of ``decide``; the logarithm of the odds that a name is right is a sum over its evidence."""
+
+    chance: float = _rule(
+        0.02, "probability", "largest chance at which structure counts as such", "chosen: false alarms"
+    )
+    odds: float = _rule(1.0, "log odds", "of a name whose evidence is neutral", "chosen")
+    explained: float = _rule(
+        1.5, "log odds per log odds", "weight of the part of all structure that the names explain", "chosen"
+    )
+    explained_even: float = _rule(0.7, "1", "part of the structure at which that is neutral", "chosen")
+    held: float = _rule(
+        0.7, "log odds per log odds", "weight of the odds that held-out data give for the effects", "chosen"
+    )
+    held_mismatch: float = _rule(
+        0.25,
+        "1",
+        "standard deviation of an inexact formula's slope on other motions",
+        "chosen",
+    )
+    held_most: float = _rule(4.0, "log odds", "most that held-out data can say", "chosen")
+    sampled: float = _rule(
+        0.5, "log odds per log odds", "weight of the share of resampled records won", "chosen"
+    )
+    limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
+    later: float = _rule(-0.5, "log odds", "for each effect beside the first", "chosen")
+    beyond: float = _rule(
+        1.0, "log odds per log odds", "weight of what an effect explains beyond smooth curves", "chosen"
+    )
+    believed: float = _rule(0.6, "probability", "least confidence of a name that is given", "chosen")
+    structured: float = _rule(
+        0.12, "1", "least part of what is left that must be structure to count", "old blind seeds 100-502"
+    )
+    rest: float = _rule(1.6, "times the noise", "what may be left without being called unknown", "chosen")
+    fall: float = _rule(0.03, "1", "least relative fall of a held-out gap for a number to be off", "chosen")
+
+
+RULES = Rules()
