@@ -85,7 +85,8 @@ def propose(
         raise InputError(f"an experiment separates at least two candidates, found {len(names)}")
     fits = {name: candidates[name] for name in names}
     first = fits[names[0]]
-    outcomes = _outcomes(bench, [_repetition(bench), *experiments(limits_of(bench, first.state))], fits)
+    repetition = [] if bench.predictors[0].plan.locked == "motor" else [_repetition(bench)]
+    outcomes = _outcomes(bench, [*repetition, *experiments(limits_of(bench, first.state))], fits)
     again = next((o.separation for o in outcomes if o.experiment.motion is not None), 0.0)
     ranked = sorted((o for o in outcomes if o.experiment.motion is None), key=lambda o: -o.separation)
     if not ranked:
@@ -207,7 +208,8 @@ def _outcomes(bench: Bench, tried: Sequence[Experiment], fits: Mapping[str, Fit]
                 whole = np.zeros((p + 1, p + 1))
                 whole[:p, :p], whole[p, p] = roots[name], UNKNOWN * shifted[1]
                 roots[name] = whole
-            complete = complete and all(one is not None for one in (records[name], *slopes[name]))
+            # Where the output is locked its angle tells nothing, and it may be all that is measured.
+            complete = complete and all(one is not None and one for one in (records[name], *slopes[name]))
         if not complete:
             continue
         outcome = None

@@ -24,7 +24,7 @@ from hdsim.estimate.check import Check, check_record
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.estimate.freedom import Interval, State, state_of
-from hdsim.estimate.predict import LoadSource, PredictionError, predictors
+from hdsim.estimate.predict import LoadSource, Locked, PredictionError, predictors
 from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record, record_from
 from hdsim.estimate.refit import Refit, refit, tie
@@ -106,9 +106,15 @@ def diagnose(
             lines = "\n".join(f"{p.record}: {p.channel}: {p.kind}: {p.message}" for p in errors)
             raise InputError(f"{lines}\nmend the mapping or the data, or go on in spite of it (--force)")
     with step("compare", "predicting the measured channels"):
-        locked = scenario.command.output.type == "locked"
-        training = predictors(records, ratio, load=load, output_locked=locked)
-        bench = Bench(training, predictors(held, ratio, load=load, output_locked=locked))
+        locked: Locked = (
+            "output"
+            if scenario.command.output.type == "locked"
+            else "motor"
+            if scenario.command.motor.type == "locked"
+            else ""
+        )
+        training = predictors(records, ratio, load=load, locked=locked)
+        bench = Bench(training, predictors(held, ratio, load=load, locked=locked))
     start = state_of(scenario)
     with step("refit", "re-fitting the model's own numbers"):
         try:

@@ -95,6 +95,29 @@ class Bench:
             )
         self.blocks += count
 
+    def hear_motion(self, state: State) -> None:
+        """Add to every series' noise what the noise of the prescribed motion does to its prediction.
+
+        Args:
+            state: the model, at plausible numbers.
+        """
+        candidate = state.candidate()
+        for index, predictor in enumerate(self.predictors):
+            other = predictor.disturbed()
+            try:
+                here, there = predictor.predict(candidate), other.predict(candidate)
+            except PredictionError:
+                continue
+            for s in self.series:
+                if s.record != index:
+                    continue
+                change = state.reading(s.channel, self._time(s), there[s.channel] - here[s.channel])
+                if s.channel == "output_angle" and not predictor.plan.locked:
+                    # It is compared beside the motor's angle, which has moved as well.
+                    change = change - (other.motor_angle - predictor.motor_angle) / predictor.ratio
+                rows = s.train | s.hold
+                s.noise = float(np.hypot(s.noise, np.std(change[rows]))) if rows.any() else s.noise
+
     @property
     def channels(self) -> tuple[str, ...]:
         """The predicted channels, each once."""

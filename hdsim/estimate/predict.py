@@ -10,6 +10,7 @@ reading: its ripple is faster than a load that is carried.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -35,6 +36,7 @@ SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 #: noise in a Jacobian looks like information; and the tolerance of a search, whose steps are larger.
 RTOL, COARSE_RTOL = 1e-6, 1e-5
 
+Locked = Literal["", "motor", "output"]
 LoadSource = Literal["scenario", "load_torque", "output_torque"]
 
 
@@ -46,13 +48,13 @@ class Plan:
         motion: ``motor_angle`` or ``output_angle``: the measured motion that is prescribed.
         load: where the load's torque comes from.
         channels: the channels that are predicted.
-        locked: whether the scenario locks the output.
+        locked: the side that the scenario locks, if any.
     """
 
     motion: str
     load: LoadSource
     channels: tuple[str, ...]
-    locked: bool = False
+    locked: Locked = ""
 
 
 @dataclass(frozen=True)
@@ -89,13 +91,13 @@ class _Gravity:
             self.load.gravity.contribute(build)
 
 
-def plan_for(record: Record, *, load: LoadSource | None = None, output_locked: bool = False) -> Plan:
+def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked = "") -> Plan:
     """Decide what is prescribed and what can be predicted.
 
     Args:
         record: the measured run.
         load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
-        output_locked: the scenario locks the output.
+        locked: the side that the scenario locks, if any.
 
     Raises:
         InputError: nothing can be predicted; the message names what is missing.
@@ -106,23 +108,36 @@ def plan_for(record: Record, *, load: LoadSource | None = None, output_locked: b
         load = "load_torque" if "load_torque" in moving else "scenario"
     if load != "scenario" and load not in has:
         raise InputError(f"{record.name}: the load is to come from {load}, which is not measured")
+    if locked == "motor":
+        return _motor_locked(record, moving)
     if "motor_angle" in has:
         motion = "motor_angle"
-    elif "output_angle" in has and not output_locked:
+    elif "output_angle" in has and not locked:
         motion = "output_angle"
     else:
         raise InputError(
             f"{record.name}: a motion is needed, motor_angle or output_angle; found {', '.join(sorted(has))}"
         )
     predicted = [c for c in ("motor_torque", "output_angle", "output_torque") if c in moving]
-    if motion == "output_angle" or output_locked:
+    if motion == "output_angle" or locked:
         predicted = [c for c in predicted if c != "output_angle"]
     if not predicted:
         raise InputError(
             f"{record.name}: nothing can be predicted from {', '.join(sorted(has))}: with {motion} given, "
             "motor_torque, output_torque or (with motor_angle) output_angle must be measured and vary"
         )
-    return Plan(motion, load, tuple(predicted), output_locked)
+    return Plan(motion, load, tuple(predicted), locked)
+
+
+def _motor_locked(record: Record, moving: set[str]) -> Plan:
+    """A drive that is twisted from its output: the torque follows from the angle."""
+    if {"output_angle", "output_torque"} <= moving:
+        return Plan("output_angle", "scenario", ("output_torque",), "motor")
+    raise InputError(
+        f"{record.name}: with the motor locked, output_angle and output_torque are needed and must vary; "
+        f"found {', '.join(sorted(moving)) or 'nothing that varies'} (a load that is measured at the output, "
+        "without inertia between, may be given as output_torque with its sign turned)"
+    )
 
 
 class Predictor:
@@ -140,11 +155,12 @@ class Predictor:
         values = record.filled(plan.motion)
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         breaks, coefficients = smoothed(record.time, values, motion=not plan.locked)
-        if plan.motion == "output_angle":
-            coefficients = coefficients * ratio
+        #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
+        self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
+        coefficients = coefficients * self._factor
         if plan.locked:
             # The encoder's zero means nothing there: the drive is unwound where it carries no torque.
-            coefficients[0] -= unloaded_angle(record)
+            coefficients[0] -= unloaded_angle(record, self._factor * values)
         self._breaks, self._coefficients = breaks, coefficients
         self.turn(0.0)
         self.load_torque: SignalData | None = None
@@ -161,7 +177,7 @@ class Predictor:
         self.runs = 0
 
     def turn(self, angle: float) -> None:
-        """Turn the prescribed motion: only where the output is locked does its zero mean anything.
+        """Turn the prescribed motion: only where a side is locked does its zero mean anything.
 
         Args:
             angle: added to the motor's angle, rad.
@@ -172,6 +188,36 @@ class Predictor:
         motion = self.motion.values(self.record.time + LEAD_IN_S)
         #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
         self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
+
+    def disturbed(self, seed: int = 0) -> Predictor:
+        """The same record with the motion as another reading would have given it (parametric bootstrap).
+
+        A reading of the smooth motion is drawn, with the noise and the steps of the sensor, and smoothed over
+        the same knots: what a prediction changes by is what the motion's own noise does to it.
+
+        Args:
+            seed: of the draw.
+        """
+        from scipy.interpolate import PPoly, make_lsq_spline
+
+        time, raw = self.record.time, self.record.filled(self.plan.motion)
+        smooth = self.motor_angle / self._factor
+        step = quantisation_step(raw[self.record.trusted[self.plan.motion]])
+        left = float(np.var(raw - smooth))
+        white = np.sqrt(max(left - step**2 / 12.0, 0.0))
+        drawn = smooth + white * np.random.default_rng([seed, 11]).standard_normal(len(raw))
+        drawn = np.round(drawn / step) * step if step > 0 else drawn
+        breaks = self._breaks
+        knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
+        found = copy(self)
+        try:
+            pieces = PPoly.from_spline(make_lsq_spline(time, drawn, knots, k=3))
+        except (ValueError, np.linalg.LinAlgError):
+            return found  # a knot a sample, as of a motion without noise
+        keep = np.diff(pieces.x) > 0
+        found._coefficients = self._factor * np.asarray(pieces.c[::-1][:, keep])
+        found.turn(0.0)
+        return found
 
     def measured(self, channel: str) -> tuple[Array, Mask, float]:
         """What a predicted channel is compared with: readings (n,), which of them count (n,), their noise.
@@ -213,8 +259,14 @@ class Predictor:
             # The scenario's load begins with the record, after the lead-in.
             parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(LEAD_IN_S))))
         motions: dict[str, Any] = {"motor": self.motion}
-        if self.plan.locked:
+        if self.plan.locked == "output":
             motions["output"] = SignalData(Hold().move())
+        elif self.plan.locked == "motor":
+            turned = -self._coefficients / self.ratio
+            motions = {
+                "motor": SignalData(Hold().move()),
+                "output": signal(self._breaks, turned, LEAD_IN_S),
+            }
         try:
             model = Model(
                 candidate.drive,
@@ -276,11 +328,16 @@ class SlowPart:
         return np.asarray(make_lsq_spline(self.time, values, self._knots, k=3)(self.time))
 
 
-def unloaded_angle(record: Record) -> float:
-    """Motor angle of a locked drive midway between its branches at zero torque, rad (0 without a torque)."""
+def unloaded_angle(record: Record, angle: Array) -> float:
+    """Motor angle of a locked drive midway between its branches at zero torque, rad (0 without a torque).
+
+    Args:
+        record: the measured run.
+        angle: motor angle beside the output, shape (n,).
+    """
     for channel in ("motor_torque", "output_torque"):
         if channel in record.channels and record.trusted[channel].sum() > 20:
-            torque, angle = record.filled(channel), record.filled("motor_angle")
+            torque = record.filled(channel)
             small = np.abs(torque) < 0.05 * np.max(np.abs(torque))
             if small.any():
                 low, high = np.quantile(angle[small], [0.05, 0.95])
@@ -300,7 +357,7 @@ def _interpolated(times: Array, values: Array, at: Array) -> Array:
 
 
 def predictors(
-    records: Sequence[Record], ratio: float, *, load: LoadSource | None = None, output_locked: bool = False
+    records: Sequence[Record], ratio: float, *, load: LoadSource | None = None, locked: Locked = ""
 ) -> list[Predictor]:
     """One predictor for each record."""
-    return [Predictor(r, plan_for(r, load=load, output_locked=output_locked), ratio) for r in records]
+    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio) for r in records]

@@ -88,6 +88,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         frees = base_freedoms(state, bench.channels, load_known=bench.load_known, locked=locked)
     freedoms = list(frees)
     before = bench.predict(state)
+    bench.hear_motion(state)
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)

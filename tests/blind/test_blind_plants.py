@@ -32,7 +32,7 @@ def compared(setup: Setup, changes: dict[str, float], effects=None) -> dict[str,
     time = np.arange(len(ideal["motor_angle"])) / setup.rate
     record = Record("blind", time, {c: ideal[c] for c in CHANNELS})
     scenario = base_of(Case(Trial("null", "nothing", 0), setup, {}))
-    predictor = predictors([record], scenario.drive.ratio, output_locked=setup.locked)[0]
+    predictor = predictors([record], scenario.drive.ratio, locked="output" if setup.locked else "")[0]
     model = state_of(scenario).candidate()
     found = predictor.predict(Candidate(model.drive, effects or {}, model.load))
     noises = setup.noises()

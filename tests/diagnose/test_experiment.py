@@ -130,7 +130,9 @@ def test_two_laws_of_hysteresis_are_told_apart_better_than_by_the_record(tmp_pat
     for given, seed in ((proposed, 5), (base, 6)):
         record = measured(given, {truth: size}, seed)
         locked = given.command.output.type == "locked"
-        told = losses(Bench(predictors([record], base.drive.ratio, output_locked=locked)), fits, 0.0)
+        told = losses(
+            Bench(predictors([record], base.drive.ratio, locked="output" if locked else "")), fits, 0.0
+        )
         gains.append(told[wrong] - told[truth])
     assert gains[0] > max(gains[1], 0.0)
 
