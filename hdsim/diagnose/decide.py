@@ -102,11 +102,13 @@ def probability(evidence: Evidence, k: int, rules: Rules, because: list[Reason])
 def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, float]]:
     """Each piece of evidence on an effect: what it is, what was seen, its weight in log odds."""
     law = evidence.laws[k]
+    explained = rules.explained * (_log_odds(evidence.explained) - _log_odds(rules.explained_even))
     found = [
+        # What all explain together speaks for the first; of a later one it only says that all are too little.
         (
             "part of the structure that the names explain",
             evidence.explained,
-            rules.explained * (_log_odds(evidence.explained) - _log_odds(rules.explained_even)),
+            min(explained, 0.0) if k else explained,
         ),
         ("held-out data show the promised change", evidence.held.slope, rules.held * _held(evidence, rules)),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
@@ -129,7 +131,8 @@ def _held(evidence: Evidence, rules: Rules) -> float:
     """Log odds of "all of the promised change is there" against "none is", by its held-out slope."""
     held = evidence.held
     variance = held.spread**2 + rules.held_mismatch**2
-    return float(min(max((2.0 * held.slope - 1.0) / (2.0 * variance), -rules.held_most), rules.held_most))
+    odds = (2.0 * held.slope - 1.0) / (2.0 * variance)
+    return float(min(max(odds, -rules.held_against), rules.held_for))
 
 
 def _log_odds(part: float, least: float = 0.02) -> float:

@@ -19,13 +19,13 @@ class Rules(Part):
     chance: float = _rule(
         0.02, "probability", "largest chance at which structure counts as such", "chosen: false alarms"
     )
-    odds: float = _rule(1.0, "log odds", "of a name whose evidence is neutral", "chosen")
+    odds: float = _rule(0.0, "log odds", "of a name whose evidence is neutral", "chosen")
     explained: float = _rule(
-        1.5, "log odds per log odds", "weight of the part of all structure that the names explain", "chosen"
+        2.0, "log odds per log odds", "weight of the part of all structure that the names explain", "chosen"
     )
     explained_even: float = _rule(0.7, "1", "part of the structure at which that is neutral", "chosen")
     held: float = _rule(
-        0.7, "log odds per log odds", "weight of the odds that held-out data give for the effects", "chosen"
+        1.0, "log odds per log odds", "weight of the odds that held-out data give for the effects", "chosen"
     )
     held_mismatch: float = _rule(
         0.25,
@@ -33,18 +33,22 @@ class Rules(Part):
         "standard deviation of an inexact formula's slope on other motions",
         "chosen",
     )
-    held_most: float = _rule(4.0, "log odds", "most that held-out data can say", "chosen")
+    held_for: float = _rule(1.5, "log odds", "most that held-out data can say for effects", "chosen")
+    held_against: float = _rule(4.0, "log odds", "most that they can say against them", "chosen")
     sampled: float = _rule(
-        0.5, "log odds per log odds", "weight of the share of resampled records won", "chosen"
+        0.3, "log odds per log odds", "weight of the share of resampled records won", "chosen"
     )
     limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
-    later: float = _rule(-0.5, "log odds", "for each effect beside the first", "chosen")
+    later: float = _rule(-1.0, "log odds", "for each effect beside the first", "chosen")
     beyond: float = _rule(
-        1.0, "log odds per log odds", "weight of what an effect explains beyond smooth curves", "chosen"
+        1.5, "log odds per log odds", "weight of what an effect explains beyond smooth curves", "chosen"
     )
     believed: float = _rule(0.6, "probability", "least confidence of a name that is given", "chosen")
     structured: float = _rule(
-        0.12, "1", "least part of what is left that must be structure to count", "old blind seeds 100-502"
+        0.12,
+        "1",
+        "least part of what is left that must be structure to count",
+        "blind seeds 100-502 of the first matrix",
     )
     rest: float = _rule(1.6, "times the noise", "what may be left without being called unknown", "chosen")
     fall: float = _rule(0.03, "1", "least relative fall of a held-out gap for a number to be off", "chosen")

@@ -1,0 +1,111 @@
+"""The verdict as a pure function of the evidence."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hdsim.diagnose.decide import decide, weighed
+from hdsim.diagnose.evidence import Evidence, HeldOutEvidence, LawEvidence, RestEvidence
+from hdsim.diagnose.rules import RULES, Rules
+
+
+def law(name: str = "kinematic_error", **changes) -> LawEvidence:
+    return LawEvidence(**{"name": name, "chance": 0.005, "sampled": 1.0, "gain": 0.9} | changes)
+
+
+def found(*laws: LawEvidence, **changes) -> Evidence:
+    return Evidence(**{"laws": list(laws), "explained": 0.99, "left_chance": 0.002} | changes)
+
+
+def test_nothing_found_is_nothing_missing():
+    assert decide(Evidence(rest=RestEvidence(record="a", channel="b", times_noise=1.1))).kind == "nothing"
+
+
+def test_a_law_that_explains_most_is_named_though_no_formula_is_exact():
+    """An eccentricity with a second harmonic: 86 % of the structure is its law's, however strong it is."""
+    decision = decide(found(law(), explained=0.86, left=0.6, held=HeldOutEvidence(slope=0.95, spread=0.01)))
+    assert decision.kind == "effect"
+    assert decision.confidence[0] > 0.7
+
+
+def test_a_law_that_explains_little_is_not():
+    decision = decide(found(law(), explained=0.3, left=0.6, held=HeldOutEvidence(slope=0.9, spread=0.05)))
+    assert decision.kind == "unknown"
+
+
+def test_held_out_data_that_hardly_excite_an_effect_do_not_judge_it():
+    silent = found(law(), held=HeldOutEvidence(slope=-1.25, spread=3.0))
+    without = found(law(), held=HeldOutEvidence(slope=0.5, spread=3.0))
+    assert decide(silent).kind == "effect"
+    assert decide(silent).confidence[0] == pytest.approx(decide(without).confidence[0], abs=0.05)
+
+
+def test_held_out_data_that_do_excite_it_and_do_not_show_it_take_the_name_away():
+    held = HeldOutEvidence(slope=0.1, spread=0.05)
+    assert decide(found(law(), explained=0.9, held=held)).kind == "unknown"
+
+
+def test_a_number_at_the_end_of_its_range_counts_against_a_name():
+    free, stuck = (decide(found(law(at_limit=a))).confidence[0] for a in (False, True))
+    assert stuck < free
+
+
+def test_what_the_re_fit_closes_is_a_parameter():
+    assert decide(Evidence(fell=0.4)).kind == "parameter"
+
+
+def test_what_is_left_beyond_the_noise_is_unknown():
+    rest = RestEvidence(record="a", channel="motor_torque", times_noise=2.5)
+    assert decide(Evidence(rest=rest)).kind == "unknown"
+
+
+def test_a_second_name_that_a_smooth_curve_explains_as_well_is_not_given():
+    decision = decide(found(law(), law("damaged_tooth", beyond=0.05, gain=0.02)))
+    assert decision.names == [0]
+
+
+laws = st.builds(
+    law,
+    sampled=st.floats(0, 1),
+    gain=st.floats(0, 1),
+    beyond=st.floats(0, 1),
+    at_limit=st.booleans(),
+)
+evidence = st.builds(
+    Evidence,
+    laws=st.lists(laws, max_size=4),
+    explained=st.floats(0, 1),
+    left=st.floats(0, 1),
+    left_chance=st.floats(0, 1),
+    held=st.builds(HeldOutEvidence, slope=st.floats(-1e6, 1e6), spread=st.floats(0, 1e6)),
+    fell=st.floats(-10, 1),
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(evidence)
+def test_every_rule_is_said_and_the_confidence_is_their_sum(given):
+    decision = decide(given)
+    assert len(decision.confidence) == len(given.laws)
+    for k, p in enumerate(decision.confidence):
+        assert 0.0 <= p <= 1.0
+        assert (k in decision.names) == (p >= RULES.believed)
+        said = [r.odds for r in decision.because if r.odds is not None and r.of == given.laws[k].name]
+        assert all(any(w == odds for odds in said) for _, _, w in weighed(given, k, RULES))
+    assert Evidence.model_validate_json(given.model_dump_json()) == given
+
+
+@settings(max_examples=100, deadline=None)
+@given(evidence.filter(lambda e: len(e.laws) > 0), st.floats(0.0, 0.4))
+def test_more_explained_never_lowers_a_confidence(given, more):
+    """The stronger an effect is, the less may its verdict fail."""
+    better = given.model_copy(update={"explained": min(1.0, given.explained + more)})
+    assert decide(better).confidence[0] >= decide(given).confidence[0] - 1e-12
+
+
+def test_every_rule_says_its_unit_and_what_calibrated_it():
+    for name, field in Rules.model_fields.items():
+        extra = field.json_schema_extra
+        assert field.description, name
+        assert extra["unit"], name
+        assert extra["calibrated_by"], name

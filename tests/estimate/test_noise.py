@@ -1,0 +1,87 @@
+"""Noise of channels: white, quantised, and what falls out of the difference of two encoders."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.noise import noise_floor, quantisation_step
+from hdsim.estimate.predict import Predictor, plan_for, predictors
+from hdsim.estimate.records import Record
+
+ALL = np.ones(6000, dtype=bool)
+
+
+def slow(seed: int, n: int = 6000) -> np.ndarray:
+    """A motion that needs many samples for a step of its encoder."""
+    phase = np.random.default_rng(seed).uniform(0, 6)
+    return 0.3 * np.sin(2 * np.pi * 0.2 * np.arange(n) / 1000.0 + phase)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(1e-6, 1e-2), st.integers(0, 1000))
+def test_a_step_is_found_from_the_readings_alone(step, seed):
+    values = np.round(slow(seed) / step) * step
+    assert quantisation_step(values) == pytest.approx(step, rel=1e-6)
+
+
+def test_continuous_readings_have_no_step():
+    values = slow(1) + 1e-4 * np.random.default_rng(0).standard_normal(6000)
+    assert quantisation_step(values) == 0.0
+
+
+@pytest.mark.parametrize("step_over_noise", [0.05, 0.3, 1.0, 3.0, 10.0, 100.0])
+def test_noise_of_a_quantised_sensor_is_that_of_its_error(step_over_noise):
+    """An encoder whose step is larger than its noise reads the same number for long: that is no silence."""
+    spread, rng = 2e-5, np.random.default_rng(3)
+    step = step_over_noise * spread
+    true = slow(3)
+    values = np.round((true + spread * rng.standard_normal(len(true))) / step) * step
+    assert noise_floor(values, ALL) == pytest.approx(float(np.std(values - true)), rel=0.35)
+
+
+def test_a_slow_record_of_a_fast_motion_is_not_taken_for_noise():
+    t = np.arange(3000) / 100.0
+    values = np.sin(2 * np.pi * 4.0 * t) + 1e-4 * np.random.default_rng(2).standard_normal(3000)
+    assert noise_floor(values, np.ones(3000, dtype=bool)) < 1e-3
+
+
+def both_encoders(jitter_s: float) -> Record:
+    """A drive of ratio 100 at 40 rad/s whose samples are taken at other times than the stamps say."""
+    rng = np.random.default_rng(5)
+    stamps = np.arange(4000) / 500.0
+    taken = stamps + jitter_s * rng.standard_normal(4000)
+    motor = 40.0 * taken + 30.0 * np.sin(taken)
+    error = 1.2e-5 * np.sin(2.0 * motor)
+    output = motor / 100.0 + error + 2e-6 * rng.standard_normal(4000)
+    return Record("joint", stamps, {"motor_angle": motor, "output_angle": output})
+
+
+def test_with_both_encoders_the_jitter_of_the_clock_falls_out():
+    record = both_encoders(3e-4)
+    alone = noise_floor(record.channels["output_angle"], np.ones(4000, dtype=bool))
+    predictor = Predictor(record, plan_for(record), 100.0)
+    measured, _, noise = predictor.measured("output_angle")
+    assert alone > 5e-5
+    assert noise < 0.2 * alone
+    # What is compared is the transmission error beside the smooth motion: order 2 at 1.2e-5 rad is seen.
+    error = measured - predictor.motor_angle / 100.0
+    wave = np.exp(-2j * predictor.motor_angle)
+    assert 2.0 * abs(np.mean((error - error.mean()) * wave)) == pytest.approx(1.2e-5, rel=0.1)
+
+
+def test_without_jitter_the_output_is_compared_as_it_reads():
+    record = both_encoders(0.0)
+    record.channels["motor_angle"] = np.round(record.channels["motor_angle"] / 0.05) * 0.05
+    measured, _, _ = Predictor(record, plan_for(record), 100.0).measured("output_angle")
+    assert measured is record.channels["output_angle"]
+
+
+def test_held_out_records_are_weighed_as_their_channel():
+    """A held-out record in SI units would let its newton metres drown its radians."""
+    bench = Bench(predictors([both_encoders(0.0)], 100.0), predictors([both_encoders(0.0)], 100.0))
+    rest = [1e-4 * np.ones(4000), np.zeros(0)]
+    bench.weigh([np.tile([1e-4, -1e-4], 2000), rest[1]])
+    learnt, held = (s.sigma for s in bench.series)
+    assert held == pytest.approx(learnt, rel=0.2)
