@@ -12,8 +12,8 @@ output of a rigid drive by the kinematics.
 
 The states are theta_m, and for ring and output the deviations theta_a - lambda_a theta_m from the ideal gear
 (lambda = 1/i, or 0 for a ring that stands still): small numbers, so that a relative tolerance means the same
-after one turn and after a thousand. Then the elements' own states, and last the energies supplied, delivered
-and dissipated.
+after one turn and after a thousand. Then the elements' own states, and last, where a model keeps them, the
+energies supplied, delivered and dissipated.
 """
 
 from __future__ import annotations
@@ -70,21 +70,18 @@ def drive_system(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, df
 
 
 @_jit
-def observe(address, times, states, integers, reals, inside, place, held, scratch, kept, rows):  # type: ignore[no-untyped-def]
-    """Evaluate at every sample and keep the first ``kept`` numbers of the scratch: shape (samples, kept).
+def observe(address, times, states, integers, reals, inside, place, held, scratch, places, rows):  # type: ignore[no-untyped-def]
+    """Evaluate at every sample and keep the numbers at ``places`` of the scratch: shape (samples, places).
 
     ``inside`` holds, for each sample, a time inside its smooth span; ``held`` what stood at ``place`` of the
     reals then (the held torque of a sampled controller; no place: -1).
     """
-    n = integers[STATES]
-    dy = np.empty(n)
+    dy = np.empty(integers[STATES])
     nothing = np.empty(0)
     for k in range(times.shape[0]):
         reals[INSIDE] = inside[k]
         if place >= 0:
             reals[place] = held[k]
         call_system(address, times[k], states[k], integers, reals, scratch, 0, dy, nothing, nothing)
-        for c in range(kept):
-            rows[k, c] = scratch[c]
-        for c in range(n):
-            rows[k, kept + c] = dy[c]
+        for c in range(len(places)):
+            rows[k, c] = scratch[places[c]]

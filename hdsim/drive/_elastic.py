@@ -9,6 +9,7 @@ from hdsim._compile import compiled
 from hdsim.drive import _mesh
 from hdsim.drive._layout import (
     COLUMNS,
+    ENERGIES,
     GAIN,
     INERTIA,
     INVERSE_RATIO,
@@ -194,12 +195,13 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     scratch[S_KINETIC] = kinetic
     scratch[S_POTENTIAL] = result[_mesh.ENERGY] + outputs[STORED]
     own = integers[OWN_STATES]
-    energies = integers[STATES] - 3
+    energies = integers[STATES] - integers[ENERGIES]
     for k in range(own):
         dy[energies - own + k] = outputs[OWN + k]
-    dy[energies] = supplied
-    dy[energies + 1] = delivered
-    dy[energies + 2] = outputs[DISSIPATED]
+    if integers[ENERGIES] > 0:
+        dy[energies] = supplied
+        dy[energies + 1] = delivered
+        dy[energies + 2] = outputs[DISSIPATED]
     if want_jacobian == 0:
         return
 
@@ -243,9 +245,9 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     full[2 * columns + MOTOR_ANGLE] += bent * error[4] - h_mo
     full[2 * columns + RING_ANGLE] -= h_fo
     full[2 * columns + OUTPUT_ANGLE] += bent * error[5] - h_oo
-    # Powers of the constraints: T = J alpha - Q.
+    # Powers of the constraints, which only the energies read: T = J alpha - Q.
     for a in range(3):
-        if integers[SIGNAL_OF + a] < 0:
+        if integers[SIGNAL_OF + a] < 0 or integers[ENERGIES] == 0:
             continue
         sign = -velocities[a] if a == 0 else velocities[a]
         target = SUPPLIED if a == 0 else DELIVERED

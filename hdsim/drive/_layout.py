@@ -15,6 +15,7 @@ SCRATCH = 10
 INTEGERS = 11
 STATE_OF = 12  # three: index of a coordinate's angle in y, or -1
 SIGNAL_OF = 15  # three: column of the signal that prescribes a coordinate, or -1
+ENERGIES = 18  # number of trailing energy states: 3 with the audit, 0 without
 LISTS = 20  # elements (address, parameters, own), twists (address, parameters), signals (address, parameters)
 
 RING_DYNAMIC = 0

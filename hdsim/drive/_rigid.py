@@ -9,6 +9,7 @@ from hdsim._compile import compiled
 from hdsim.drive import _mesh
 from hdsim.drive._layout import (
     COLUMNS,
+    ENERGIES,
     INERTIA,
     INVERSE_RATIO,
     OWN_STATES,
@@ -118,12 +119,13 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
     scratch[S_CONSTRAINT] = constraint
     scratch[S_CONSTRAINT + 1] = 0.0
     scratch[S_CONSTRAINT + 2] = 0.0
-    energies = integers[STATES] - 3
+    energies = integers[STATES] - integers[ENERGIES]
     for k in range(own):
         dy[energies - own + k] = outputs[OWN + k]
-    dy[energies] = outputs[SUPPLIED] + constraint * vm
-    dy[energies + 1] = outputs[DELIVERED]
-    dy[energies + 2] = outputs[DISSIPATED]
+    if integers[ENERGIES] > 0:
+        dy[energies] = outputs[SUPPLIED] + constraint * vm
+        dy[energies + 1] = outputs[DELIVERED]
+        dy[energies + 2] = outputs[DISSIPATED]
     if want_jacobian == 0:
         return
     # dc'/dtheta_m needs the error's third derivative: a central difference, exact to about 1e-9.

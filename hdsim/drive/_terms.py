@@ -9,6 +9,7 @@ from hdsim._compile import compiled
 from hdsim.drive._layout import (
     COLUMNS,
     ELEMENTS,
+    ENERGIES,
     INERTIA,
     INSIDE,
     LAMBDA,
@@ -71,7 +72,7 @@ def read_coordinates(t, y, integers, reals, scratch):  # type: ignore[no-untyped
         else:
             for k in range(3):
                 scratch[S_ANGLES + 3 * k + a] = 0.0
-    last = integers[STATES] - 3
+    last = integers[STATES] - integers[ENERGIES]
     for k in range(own):
         scratch[S_INPUTS + OWN + k] = y[last - own + k]
 
@@ -136,12 +137,12 @@ def scatter(integers, reals, scratch, full, jacobian, dfdt):  # type: ignore[no-
     """From rows and columns of the elements to those of the states; what is prescribed goes into df/dt."""
     n = integers[STATES]
     own = integers[OWN_STATES]
-    energies = n - 3
+    energies = n - integers[ENERGIES]
     first_own = energies - own
     columns = integers[COLUMNS]
     jacobian[: n * n] = 0.0
     dfdt[:n] = 0.0
-    for kind in range(3 + own + 3):
+    for kind in range(3 + own + integers[ENERGIES]):
         # Which row of ``full`` drives which state, and its factor.
         if kind < 3:
             index = integers[STATE_OF + kind]

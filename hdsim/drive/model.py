@@ -47,6 +47,7 @@ class Model:
         load_inertia_kg_m2: inertia on the output, kg m^2.
         motions: signals that prescribe ``motor`` or ``output`` angles (rad).
         seed: seed of the random tooth surfaces and of all noise.
+        audited: the energies supplied, delivered and dissipated are states, which the energy audit needs.
 
     Attributes:
         system: the ODE, a ``hdsim.simulation.system.System``.
@@ -62,8 +63,10 @@ class Model:
         load_inertia_kg_m2: float,
         motions: dict[str, Any] | None = None,
         seed: int = 0,
+        audited: bool = True,
     ) -> None:
         self.drive = drive
+        self.audited = audited
         self.parts = tuple(parts)
         self.ratio = drive.ratio
         self.rated_torque_nm = drive.rated_torque_nm
@@ -213,7 +216,8 @@ class Model:
             raise InputError("a rigid drive cannot have its output prescribed: prescribe the motor")
         kernel, mesh_parameters = self._mesh_parameters()
         free = [name for name in COORDINATES if self._is_free(name)]
-        states = 2 * len(free) + len(given.states) + 3
+        energies = 3 if self.audited else 0
+        states = 2 * len(free) + len(given.states) + energies
         columns = OWN + len(given.states) + SIGNAL_VALUES * len(given.signals)
         rows = OWN + len(given.states)
         gain, output_share, kappa = self.kinematics
@@ -249,6 +253,7 @@ class Model:
         head_integers = np.zeros(a.LISTS, dtype=np.int64)
         head_integers[a.STATES] = states
         head_integers[a.OWN_STATES] = len(given.states)
+        head_integers[a.ENERGIES] = energies
         head_integers[a.SIGNALS] = len(given.signals)
         head_integers[a.ELEMENTS] = len(given.elements)
         head_integers[a.TWISTS] = len(given.twists)
@@ -276,14 +281,14 @@ class Model:
         head_integers[a.SCRATCH] = scratch
         head_integers[a.INTEGERS] = a.LISTS + len(lists)
         self._columns = columns
-        y0, scale = self._initial(states)
+        y0, scale = self._initial(states, energies)
         return System(
             kernel=drive_system,
             integers=np.concatenate([head_integers, np.array(lists, dtype=np.int64)]),
             reals=np.concatenate(reals),
             scratch_size=scratch,
             y0=y0,
-            quadratures=3,
+            quadratures=energies,
             scale=scale,
         )
 
@@ -294,7 +299,7 @@ class Model:
             return self.has_ring
         return not (name == "output" and self.rigid)
 
-    def _initial(self, size: int) -> tuple[Array, Array]:
+    def _initial(self, size: int, energies: int) -> tuple[Array, Array]:
         """Initial states and the sizes at which their errors matter."""
         y0, scale = np.zeros(size), np.zeros(size)
         torsion = self.drive.torsion
@@ -306,9 +311,9 @@ class Model:
             # Velocity of the slow torsional mode at that amplitude.
             scale[at + 1] = angle * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / max(output, 1e-3)))
         for k, state in enumerate(self.states):
-            y0[size - 3 - len(self.states) + k] = state.initial
-            scale[size - 3 - len(self.states) + k] = state.scale
-        scale[-3:] = self.rated_torque_nm * wind_up
+            y0[size - energies - len(self.states) + k] = state.initial
+            scale[size - energies - len(self.states) + k] = state.scale
+        scale[size - energies :] = self.rated_torque_nm * wind_up
         return y0, scale
 
     def initial_state(

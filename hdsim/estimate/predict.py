@@ -19,7 +19,7 @@ import numpy as np
 from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.noise import noise_floor, quantisation_step, white_noise
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import TAIL_S, signal, smoothed
+from hdsim.estimate.spline import signal, smoothed
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
@@ -249,7 +249,8 @@ class Predictor:
         from hdsim.actuation.shapes import Hold
         from hdsim.actuation.signal_data import SignalData
         from hdsim.drive.model import Model
-        from hdsim.simulation.run import Run
+        from hdsim.simulation.run import RunFailed
+        from hdsim.simulation.sample import sample
 
         load = candidate.load
         parts: list[Any] = [*candidate.effects.values(), _Gravity(load)]
@@ -274,28 +275,22 @@ class Predictor:
                 load_inertia_kg_m2=load.inertia_kg_m2,
                 motions=motions,
                 seed=candidate.seed,
+                audited=False,
             )
         except PhysicsError as error:
             raise PredictionError(str(error)) from None
-        period = self.record.period_s
-        run = Run(
-            model,
-            duration_s=LEAD_IN_S + self.record.duration_s + min(2 * period, TAIL_S),
-            sample_rate_hz=1.0 / period,
-            rtol=self.rtol,
-        )
         self.runs += 1
-        got = run.record()
-        if run.failure:
-            raise PredictionError(run.failure)
-        found = {}
-        at = self.record.time + LEAD_IN_S
-        for channel in self.plan.channels:
-            source = f"measured_{channel}" if f"measured_{channel}" in got else channel
-            found[channel] = _interpolated(got.time, got[source], at)
+        asked = dict.fromkeys(self.plan.channels)
+        if self._slow is not None:
+            asked["output_torque"] = None
+        try:
+            got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol)
+        except RunFailed as error:
+            raise PredictionError(str(error)) from None
+        found = {c: got.get(f"measured_{c}", got[c]) for c in self.plan.channels}
         if self._slow is not None:
             # Not compared, but it tells an effect that acts behind the sensor, where none can be seen.
-            found[CARRIED] = _interpolated(got.time, got["output_torque"], at)
+            found[CARRIED] = got["output_torque"]
             if "output_torque" in found:
                 # What the sensor adds, and of that what a slow load could not be.
                 own = found["output_torque"] - found[CARRIED]
@@ -347,13 +342,6 @@ def unloaded_angle(record: Record, angle: Array) -> float:
 
 class PredictionError(ArithmeticError):
     """A candidate model could not be integrated."""
-
-
-def _interpolated(times: Array, values: Array, at: Array) -> Array:
-    """Cubic interpolation; exact where the clocks agree."""
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(times, values)(at))
 
 
 def predictors(

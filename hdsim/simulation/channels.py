@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 from hdsim.drive import _layout as a
 from hdsim.drive import _mesh
 from hdsim.drive._assembly import observe
+from hdsim.errors import InputError
 from hdsim.kernel import (
     COMMANDED_TORQUE,
     INPUT_FRICTION,
@@ -25,8 +29,30 @@ from hdsim.recording import Column, Table
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
     from hdsim.drive.model import Model
+    from hdsim.effects._readers import Sensor
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A channel as a function of numbers in the compiled code's scratch.
+
+    Args:
+        unit: SI unit.
+        description: one line for the log.
+        places: where the numbers stand in the scratch.
+        of: the channel, shape (m,), from their values, shape (m,) each.
+    """
+
+    unit: str
+    description: str
+    places: tuple[int, ...]
+    of: Callable[..., Array] = lambda values: values
+
+
+def _sum(first: Array, second: Array) -> Array:
+    return first + second
 
 
 class Observer:
@@ -43,13 +69,61 @@ class Observer:
         self._start_energy: float | None = None
         integers = model.system.integers
         self._columns = int(integers[a.COLUMNS])
-        self._rows = OWN + len(model.states)
-        self._kept = a.S_INPUTS + self._columns + self._rows
+        self._kept = a.S_INPUTS + self._columns + OWN + len(model.states)
+
+    @cached_property
+    def formulas(self) -> dict[str, Formula]:
+        """What the compiled code's scratch tells at each sample, by channel."""
+        inputs, outputs = a.S_INPUTS, a.S_INPUTS + self._columns
+        ratio = self.model.ratio
+        found = {
+            "motor_angle": Formula("rad", "motor and wave generator", (a.S_ANGLES,)),
+            "motor_velocity": Formula("rad/s", "motor and wave generator", (a.S_VELOCITIES,)),
+            # The windings' torque, or what a prescribed motion costs.
+            "motor_torque": Formula(
+                "N m", "torque of the motor on its shaft", (outputs + COMMANDED_TORQUE, a.S_CONSTRAINT), _sum
+            ),
+            "output_angle": Formula("rad", "output and load", (a.S_ANGLES + 2,)),
+            "output_velocity": Formula("rad/s", "output and load", (a.S_VELOCITIES + 2,)),
+            "output_torque": Formula(
+                "N m",
+                "torque of the drive on the output",
+                (
+                    inputs + TRANSMITTED_TORQUE,
+                    outputs + TWIST_TORQUE,
+                    a.S_TWIST_1 + 2,
+                    outputs + MESH_TORQUE,
+                    a.S_MESH_1 + 2,
+                ),
+                lambda elastic, twist, lever, mesh, mesh_lever: elastic + twist * lever + mesh * mesh_lever,
+            ),
+            "load_torque": Formula(
+                "N m", "external torque on the output", (outputs + LOAD_TORQUE, a.S_CONSTRAINT + 2), _sum
+            ),
+        }
+        if self.model.has_ring:
+            found["ring_angle"] = Formula("rad", "flexspline toothed ring", (a.S_ANGLES + 1,))
+            found["ring_velocity"] = Formula("rad/s", "flexspline toothed ring", (a.S_VELOCITIES + 1,))
+        return found | {
+            "transmission_error": Formula(
+                "rad",
+                "output angle less motor angle over ratio",
+                (a.S_ANGLES + 2, a.S_ANGLES),
+                lambda output, motor: output - motor / ratio,
+            ),
+            "kinematic_error": Formula("rad", "error of the unloaded drive", (a.S_ERROR,)),
+            "twist": Formula("rad", "twist of the torsion spring", (inputs + TWIST,)),
+            "input_friction_torque": Formula(
+                "N m", "friction on the motor shaft", (outputs + INPUT_FRICTION,)
+            ),
+            "kinetic_energy": Formula("J", "of all inertias", (a.S_KINETIC,)),
+            "potential_energy": Formula("J", "of mesh, torsion spring, load and effects", (a.S_POTENTIAL,)),
+        }
 
     def samples(
         self, times: Array, states: Array, inside: Array, held: Array | None = None, place: int = -1
     ) -> Array:
-        """The compiled code's scratch at every sample, shape (samples, kept + states).
+        """The compiled code's scratch at every sample, shape (samples, kept).
 
         Args:
             times: shape (m,), s.
@@ -58,8 +132,47 @@ class Observer:
             held: shape (m,), torque that a sampled controller held at each sample, N m.
             place: where in the system's reals that torque stands.
         """
+        return self._observed(np.arange(self._kept), times, states, inside, held, place)
+
+    def values(self, channels: Sequence[str], times: Array, states: Array, inside: Array) -> dict[str, Array]:
+        """Some channels, shape (m,) each; the arguments are those of ``samples``.
+
+        Args:
+            channels: names in ``formulas``, or of states that parts add.
+            times: s.
+            states: states of the model.
+            inside: a time within each sample's smooth span, s.
+
+        Raises:
+            InputError: there is no such channel.
+        """
+        own = {state.name: k for k, state in enumerate(self.model.states, self._first_state)}
+        found = {name: np.ascontiguousarray(states[:, own[name]]) for name in channels if name in own}
+        chosen = [name for name in channels if name not in own]
+        for name in chosen:
+            if name not in self.formulas:
+                raise InputError(
+                    f"the model has no channel {name!r}; there are: {', '.join([*self.formulas, *own])}"
+                )
+        places = np.array([p for name in chosen for p in self.formulas[name].places], dtype=np.int64)
+        columns = iter(np.ascontiguousarray(self._observed(places, times, states, inside).T))
+        for name in chosen:
+            formula = self.formulas[name]
+            found[name] = formula.of(*(next(columns) for _ in formula.places))
+        return found
+
+    def _observed(
+        self,
+        places: NDArray[np.int64],
+        times: Array,
+        states: Array,
+        inside: Array,
+        held: Array | None = None,
+        place: int = -1,
+    ) -> Array:
+        """The numbers of the scratch at some places, shape (samples, places)."""
         system = self.model.system
-        rows = np.empty((len(times), self._kept + system.size))
+        rows = np.empty((len(times), len(places)))
         observe(
             system.kernel.address,
             times,
@@ -70,71 +183,35 @@ class Observer:
             place,
             np.zeros(len(times)) if held is None else held,
             np.zeros(system.scratch_size),
-            self._kept,
+            places,
             rows,
         )
         return rows
 
-    def inputs(self, rows: Array, column: int) -> Array:
-        """A column of the elements' inputs."""
-        found: Array = rows[:, a.S_INPUTS + column]
-        return found
-
-    def outputs(self, rows: Array, row: int) -> Array:
-        """A row of the elements' outputs."""
-        found: Array = rows[:, a.S_INPUTS + self._columns + row]
-        return found
-
-    def motor_torque(self, rows: Array) -> Array:
-        """Torque at the motor shaft: the windings', or what a prescribed motion costs, N m."""
-        return self.outputs(rows, COMMANDED_TORQUE) + rows[:, a.S_CONSTRAINT]
+    @property
+    def _first_state(self) -> int:
+        """Index of the first state that a part adds."""
+        return self.model.system.size - self.model.system.quadratures - len(self.model.states)
 
     def state_table(self, times: Array, states: Array, inside: Array, rows: Array) -> Table:
-        """The channels at full rate."""
+        """The channels of an audited model at full rate."""
         model = self.model
-        motor, ring, output = (rows[:, a.S_ANGLES + k] for k in range(3))
-        motor_v, ring_v, output_v = (rows[:, a.S_VELOCITIES + k] for k in range(3))
-        kinetic, potential = rows[:, a.S_KINETIC], rows[:, a.S_POTENTIAL]
-        supplied, delivered, heat = states[:, -3], states[:, -2], states[:, -1]
-        balance = kinetic + potential - supplied + delivered + heat
-        if self._start_energy is None:
-            self._start_energy = float(balance[0])
-        output_torque = (
-            self.inputs(rows, TRANSMITTED_TORQUE)
-            + self.outputs(rows, TWIST_TORQUE) * rows[:, a.S_TWIST_1 + 2]
-            + self.outputs(rows, MESH_TORQUE) * rows[:, a.S_MESH_1 + 2]
-        )
         columns = {
-            "motor_angle": Column(motor, "rad", "motor and wave generator"),
-            "motor_velocity": Column(motor_v, "rad/s", "motor and wave generator"),
-            "motor_torque": Column(self.motor_torque(rows), "N m", "torque of the motor on its shaft"),
-            "output_angle": Column(output, "rad", "output and load"),
-            "output_velocity": Column(output_v, "rad/s", "output and load"),
-            "output_torque": Column(output_torque, "N m", "torque of the drive on the output"),
-            "load_torque": Column(
-                self.outputs(rows, LOAD_TORQUE) + rows[:, a.S_CONSTRAINT + 2],
-                "N m",
-                "external torque on the output",
-            ),
+            name: Column(formula.of(*(rows[:, p] for p in formula.places)), formula.unit, formula.description)
+            for name, formula in self.formulas.items()
         }
-        if model.has_ring:
-            columns["ring_angle"] = Column(ring, "rad", "flexspline toothed ring")
-            columns["ring_velocity"] = Column(ring_v, "rad/s", "flexspline toothed ring")
         if self.reference is not None:
             wanted = self.reference.values(times, inside)[0]
             columns["reference_angle"] = Column(wanted, "rad", "commanded angle, at the output")
-            columns["tracking_error"] = Column(output - wanted, "rad", "output angle less commanded angle")
+            columns["tracking_error"] = Column(
+                columns["output_angle"].values - wanted, "rad", "output angle less commanded angle"
+            )
+        supplied, delivered, heat = states[:, -3], states[:, -2], states[:, -1]
+        stored = columns["kinetic_energy"].values + columns["potential_energy"].values
+        balance = stored - supplied + delivered + heat
+        if self._start_energy is None:
+            self._start_energy = float(balance[0])
         columns |= {
-            "transmission_error": Column(
-                output - motor / model.ratio, "rad", "output angle less motor angle over ratio"
-            ),
-            "kinematic_error": Column(rows[:, a.S_ERROR].copy(), "rad", "error of the unloaded drive"),
-            "twist": Column(self.inputs(rows, TWIST), "rad", "twist of the torsion spring"),
-            "input_friction_torque": Column(
-                self.outputs(rows, INPUT_FRICTION), "N m", "friction on the motor shaft"
-            ),
-            "kinetic_energy": Column(kinetic, "J", "of all inertias"),
-            "potential_energy": Column(potential, "J", "of mesh, torsion spring, load and effects"),
             "work_supplied": Column(supplied, "J", "by the motor since the start"),
             "work_delivered": Column(delivered, "J", "to the outside at the output since the start"),
             "heat": Column(heat, "J", "dissipated since the start"),
@@ -146,15 +223,22 @@ class Observer:
             engaged = rows[:, a.S_MESH + _mesh.ENGAGED] / model.teeth.count
             if not np.isnan(engaged).any():
                 columns["engaged_share"] = Column(engaged, "1", "share of the teeth that carry load")
-        first = states.shape[1] - 3 - len(model.states)
-        for k, state in enumerate(model.states):
-            columns[state.name] = Column(states[:, first + k], state.unit, state.description)
+        for k, state in enumerate(model.states, self._first_state):
+            columns[state.name] = Column(states[:, k], state.unit, state.description)
         return Table(times, {name: _contiguous(column) for name, column in columns.items()})
 
-    def sensed(self, history: Table, at: Array) -> dict[str, Column]:
-        """Readings of the sensors at the instants ``at`` (s), from a table that reaches back far enough."""
+    def sensed(
+        self, history: Table, at: Array, sensors_of: Mapping[str, Sequence[Sensor]] | None = None
+    ) -> dict[str, Column]:
+        """Readings of the sensors at the instants ``at`` (s), from a table that reaches back far enough.
+
+        Args:
+            history: the true channels.
+            at: shape (m,), s.
+            sensors_of: the sensors by channel; all of the model's when None.
+        """
         readings = {}
-        for channel, sensors in self.model.sensors.items():
+        for channel, sensors in (self.model.sensors if sensors_of is None else sensors_of).items():
             values = history[channel]
             times = history.time
             for sensor in sensors:

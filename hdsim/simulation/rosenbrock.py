@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
 
+from hdsim.simulation import _cover
 from hdsim.simulation import _rosenbrock as compiled
+from hdsim.simulation.failures import Guard
+from hdsim.simulation.solvers import Integration, Statistics
 from hdsim.simulation.system import System
 
 Array = NDArray[np.float64]
@@ -19,7 +22,14 @@ Array = NDArray[np.float64]
 _CAUSES = {
     compiled.STEP_TOO_SMALL: OdeSolver.TOO_SMALL_STEP,
     compiled.NOT_FINITE: "The right-hand side or its Jacobian is not finite.",
+    _cover.NOT_FINITE_STATE: "The state is not finite.",
 }
+
+
+#: The statuses with which ``advance`` names a state.
+_NAMES_SUSPECT = (compiled.STEP_TOO_SMALL, compiled.NOT_FINITE)
+#: Blocks of steps that are taken between two looks at Ctrl-C: about a tenth of a second.
+_BLOCKS = 500
 
 
 class _Block:
@@ -72,21 +82,32 @@ class _Block:
             )
         )
 
-    def run(self, t_eval: Array) -> tuple[int, Array]:
-        """Integrate to the bound and sample at increasing ``t_eval``; see ``_rosenbrock.run``."""
-        out = np.full((len(self.y), len(t_eval)), np.nan)
-        status = compiled.run(
-            *self._kernel,
-            self.y,
-            self.atol,
-            self.control,
-            self.counts,
-            self._work,
-            *self.record,
-            t_eval,
-            out,
-        )
-        return int(status), out
+    def cover(
+        self, cuts: Array, inside_at: int, guard: Guard | None, t_eval: Array
+    ) -> tuple[int, Array, int]:
+        """Integrate through all spans; see ``_cover.cover``. Returns status, samples (m, n), their number."""
+        out = np.full((len(t_eval), len(self.y)), np.nan)
+        progress = np.zeros(2, dtype=np.int64)
+        status = compiled.RUNNING
+        while status == compiled.RUNNING:
+            status = _cover.cover(
+                *self._kernel,
+                self.y,
+                self.atol,
+                self.control,
+                self.counts,
+                self._work,
+                *self.record,
+                cuts,
+                inside_at,
+                -1 if guard is None else guard.index,
+                np.inf if guard is None else guard.limit,
+                t_eval,
+                out,
+                progress,
+                _BLOCKS,
+            )
+        return int(status), out, int(progress[_cover.SAMPLED])
 
 
 class Rodas4(OdeSolver):  # type: ignore[misc]
@@ -210,39 +231,59 @@ class BlockDenseOutput(DenseOutput):  # type: ignore[misc]
         return out[:, 0] if np.ndim(t) == 0 else out
 
 
-def bare_rodas4(
+def rodas4_through(
     system: System,
-    t0: float,
-    t1: float,
+    cuts: Array,
     y0: Array,
     t_eval: Array,
     *,
     rtol: float,
     atol: float | Array,
+    stops: Array | None = None,
+    inside_at: int = -1,
+    guard: Guard | None = None,
     first_step: float | None = None,
     max_step: float = np.inf,
-) -> tuple[Array, Array, int]:
-    """Integrate forward in one compiled loop without SciPy: the yardstick for what SciPy's loop costs.
+) -> Integration:
+    """Integrate forward through smooth spans in one compiled loop, without SciPy's.
+
+    The steps are those of ``Rodas4`` called span after span, so that the result is the same to rounding;
+    what SciPy's loop costs is saved, which counts where a run is short and is asked for a thousand times.
 
     Args:
         system: the compiled system.
-        t0: start.
-        t1: end, after the start.
+        cuts: shape (spans + 1,), s, increasing: start, what the right-hand side jumps at, end.
         y0: initial state, shape (n,).
-        t_eval: increasing times to sample at, shape (m,), within the bounds.
+        t_eval: increasing times to sample at, shape (m,), within the cuts.
         rtol: relative tolerance.
         atol: absolute tolerance, a number or shape (n,).
+        stops: increasing times at which a step ends, shape (s,); see ``Rodas4``.
+        inside_at: place in the system's reals of a time inside the current span; -1 when it has none.
+        guard: gives the run up.
         first_step: size of the first step; chosen when None.
         max_step: largest step.
 
     Returns:
-        Samples (n, m), final state (n,) and number of accepted steps.
-
-    Raises:
-        ArithmeticError: the integration failed.
+        Samples (n, m) up to where it came, and why it stopped. ``message`` has no hint at the cause.
     """
-    block = _Block(system, t0, y0, t1, rtol, atol, first_step, max_step, 64)
-    status, samples = block.run(np.ascontiguousarray(t_eval, dtype=np.float64))
-    if status < 0:
-        raise ArithmeticError(f"{_CAUSES[status]} t = {block.control[compiled.T]}")
-    return samples, block.y, int(block.counts[compiled.ACCEPTED])
+    t_eval = np.ascontiguousarray(t_eval, dtype=np.float64)
+    if system.size == 0:
+        return Integration(t_eval, np.empty((0, len(t_eval))), float(cuts[-1]), y0, None, True, "")
+    block = _Block(system, float(cuts[0]), y0, float(cuts[1]), rtol, atol, first_step, max_step, 64, stops)
+    status, samples, count = block.cover(cuts, inside_at, guard, t_eval)
+    t = float(block.control[compiled.T])
+    error = guard.error() if status == _cover.RUNAWAY and guard is not None else None
+    cause = f"RunawayError: {error}." if error is not None else _CAUSES.get(status, "")
+    suspect = int(block.counts[compiled.SUSPECT]) if status in _NAMES_SUSPECT else -1
+    return Integration(
+        t=t_eval[:count],
+        y=samples[:count].T,
+        t_end=t,
+        y_end=block.y,
+        next_step=float(block.control[compiled.STEP]),
+        success=status == compiled.FINISHED,
+        message=f"{cause} Stopped at t = {t:.9g} s." if cause else "",
+        statistics=Statistics(*block.counts[compiled.NFEV : compiled.REJECTED + 1].tolist()),
+        suspect=suspect if suspect >= 0 else None,
+        exception=error,
+    )

@@ -20,16 +20,15 @@ from hdsim.errors import HdsimError
 from hdsim.recording import Column, Event, Recording, Table
 from hdsim.simulation.channels import Observer
 from hdsim.simulation.events import EventDetector
+from hdsim.simulation.failures import speed_guard, told
 from hdsim.simulation.solvers import Statistics, integrate
+from hdsim.simulation.spans import cuts, stops
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
     from hdsim.drive.model import Model
 
 Array = NDArray[np.float64]
-
-#: Motor speed beyond which a run is stopped: a hundred times what such motors reach, rad/s.
-FASTEST = 1e5
 
 #: Samples of the state table that leave together, and the longest span in samples.
 BLOCK = 4000
@@ -82,10 +81,6 @@ class Audit:
     def relative(self) -> float:
         """Residual over exchanged energy."""
         return self.residual / self.exchanged if self.exchanged > 0 else 0.0
-
-
-class RunawayError(ArithmeticError):
-    """A shaft is faster than any drive can be."""
 
 
 class RunFailed(HdsimError):  # noqa: N818 - read aloud: "run failed"
@@ -157,25 +152,13 @@ class Run:
 
     def spans(self) -> Array:
         """Times at which the integration is cut, from 0 to the duration: shape (spans + 1,)."""
-        cuts = [np.array([0.0, self.duration_s])]
-        cuts += [np.asarray(signal.corners(0.0, self.duration_s)) for signal in self.model.signals]
         longest = self.block / self.sample_rate_hz
-        cuts.append(np.arange(1, math.ceil(self.duration_s / longest)) * longest)
+        further = longest * np.arange(1.0, math.ceil(self.duration_s / longest))
         if self.loop is not None:
-            cuts.append(
-                np.arange(math.ceil(self.duration_s / self.loop.period_s - 1e-9)) * self.loop.period_s
-            )
-        times = np.unique(np.concatenate(cuts))
-        times = times[(times >= 0.0) & (times <= self.duration_s)]
-        keep = np.concatenate([[True], np.diff(times) > 1e-12 * max(1.0, self.duration_s)])
-        times = times[keep]
-        times[-1] = self.duration_s
-        return np.asarray(times)
-
-    def stops(self) -> Array:
-        """Times at which a prescribed motion's third derivative jumps, shape (k,): steps end there."""
-        joints = [signal.joints(0.0, self.duration_s) for signal in self.model.motions.values()]
-        return np.unique(np.concatenate([np.zeros(0), *joints]))
+            period = self.loop.period_s
+            instants = period * np.arange(float(math.ceil(self.duration_s / period - 1e-9)))
+            further = np.concatenate([further, instants])
+        return cuts(self.model.signals, self.duration_s, further)
 
     def blocks(self, on_time: Callable[[float], object] | None = None) -> Iterator[dict[str, Table]]:
         """Integrate; yields tables by name as soon as a block of samples is complete.
@@ -185,17 +168,17 @@ class Run:
         """
         from hdsim.drive import _layout as a
 
-        velocity = self.model.place_of.get("motor", self.model.place_of.get("output", -1)) + 1
+        guard = speed_guard(self.model)
 
         def watch(t: float, y: Array) -> None:
-            if abs(y[velocity]) > FASTEST:
-                raise RunawayError(f"{self.state_names()[velocity]} exceeds {FASTEST:g}")
+            if guard is not None and abs(y[guard.index]) > guard.limit:
+                raise guard.error()
             if on_time is not None:
                 on_time(t)
 
         count = math.floor(self.duration_s * self.sample_rate_hz * (1 + 1e-12)) + 1
         samples = np.arange(count) / self.sample_rate_hz
-        cuts, stops = self.spans(), self.stops()
+        spans, corners = self.spans(), stops(self.model, self.duration_s)
         reals = self.model.system.reals
         y = self.y0
         step: float | None = None
@@ -206,7 +189,7 @@ class Run:
         waiting = 0
         done = 0
         self.events += self.detector.start(self.method)
-        for t0, t1 in itertools.pairwise(cuts):
+        for t0, t1 in itertools.pairwise(spans):
             change = None if self.before_span is None else self.before_span(float(t0))
             if change is not None:
                 if waiting:
@@ -230,7 +213,7 @@ class Run:
                 t_eval=np.clip(wanted, t0, t1),
                 first_step=step,
                 max_step=self.max_step_s,
-                stops=stops[np.searchsorted(stops, t0) : np.searchsorted(stops, t1)],
+                stops=corners[np.searchsorted(corners, t0) : np.searchsorted(corners, t1)],
                 on_step=watch,
             )
             self.statistics.add(found.statistics)
@@ -246,7 +229,7 @@ class Run:
                 on_time(found.t_end)
             if not found.success:
                 self._fail(found)
-            if waiting >= self.block or (waiting and (self.failure or t1 == cuts[-1])):
+            if waiting >= self.block or (waiting and (self.failure or t1 == spans[-1])):
                 yield self._block(*(np.concatenate(part) for part in (times, states, insides, helds)))
                 times, states, insides, helds, waiting = [], [], [], [], 0
             if self.failure:
@@ -291,45 +274,8 @@ class Run:
     def _fail(self, found: Any) -> None:
         """Record why the integration stopped."""
         self.interrupted = found.exception if isinstance(found.exception, KeyboardInterrupt) else None
-        names = self.state_names()
-        values = found.y_end
-        state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, values, strict=True))
-        self.failure = f"{found.message} {self._likely_cause(found)} Last state: {state}."
+        self.failure = told(self.model, found)
         self.events.append(Event(found.t_end, "error", "solver", self.failure))
-
-    def _likely_cause(self, found: Any) -> str:
-        """One sentence on what probably stopped the integration."""
-        names = self.state_names()
-        if self.interrupted:
-            return "Stopped from outside."
-        if found.exception is not None and not isinstance(found.exception, RunawayError):
-            return "The method itself raised."
-        # The energies grow in any long run; the others are compared with the sizes that matter.
-        growth = np.abs(found.y_end[:-3]) / self.model.system.scale[:-3]
-        turned = self.model.place_of.get("motor")
-        if turned is not None:
-            growth[turned] = 0.0
-        worst = int(np.argmax(growth)) if len(growth) else 0
-        if len(growth) and (growth[worst] > 1e4 or isinstance(found.exception, RunawayError)):
-            return (
-                f"Likely cause: {names[worst]} runs away (unstable loop, wrong sign of a gain, "
-                f"or a torque that nothing balances)."
-            )
-        if found.suspect is not None:
-            return f"Likely cause: {names[found.suspect]} changes faster than the method can follow."
-        return "Likely cause: a parameter outside its law's range, or a tolerance finer than rounding allows."
-
-    def state_names(self) -> list[str]:
-        """Names of the states, in their order in the state vector."""
-        names = [""] * self.model.system.size
-        for name, at in self.model.place_of.items():
-            label = name if name == "motor" else f"{name} less ideal"
-            names[at], names[at + 1] = f"{label} angle (rad)", f"{label} velocity (rad/s)"
-        first = len(names) - 3 - len(self.model.states)
-        for k, state in enumerate(self.model.states):
-            names[first + k] = f"{state.name} ({state.unit})"
-        names[-3:] = ["work supplied (J)", "work delivered (J)", "heat (J)"]
-        return names
 
     def static(self) -> dict[str, Column]:
         """What does not change in time: gaps and pitch errors of the teeth."""

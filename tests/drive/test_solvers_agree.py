@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hdsim.scenario import Scenario
-from hdsim.simulation.rosenbrock import bare_rodas4
+from hdsim.simulation.rosenbrock import rodas4_through
 from hdsim.simulation.setup import build_run
 from hdsim.simulation.solvers import METHODS, integrate
 
@@ -79,7 +79,7 @@ def worst(found: Any, wanted: Any) -> float:
 def solution(run: Any, rtol: float, longer: float = 1.0) -> Any:
     system, times = run.model.system, longer * TIMES
     tolerances = {"rtol": rtol, "atol": rtol * system.scale}
-    return channels(run, bare_rodas4(system, 0.0, times[-1], run.y0, times, **tolerances)[0], longer)
+    return channels(run, rodas4_through(system, times[[0, -1]], run.y0, times, **tolerances).y, longer)
 
 
 @pytest.fixture(scope="module")

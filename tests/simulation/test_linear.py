@@ -17,6 +17,7 @@ from hdsim.plot import plot_bode
 from hdsim.plot.bode import frequency_grid
 from hdsim.scenario import Scenario
 from hdsim.simulation.commands_linear import linearize as command
+from hdsim.simulation.failures import state_names
 from hdsim.simulation.linear import OUTPUTS, close_loop, find_operating_point, io_system, linearize
 from hdsim.simulation.modes import modes
 from hdsim.simulation.plant import Plant
@@ -264,7 +265,7 @@ def test_the_closed_linear_loop_follows_a_simulated_step():
         "reference_acceleration",
         "load_torque",
     ]
-    place = next(k for k, label in enumerate(run.state_names()) if label.startswith("controller"))
+    place = next(k for k, label in enumerate(state_names(run.model)) if label.startswith("controller"))
     gain = one.command.motor.canonical(one.drive.ratio).C[0]
     run.y0[place] = point.motor_torque / gain
     simulated = run.record()

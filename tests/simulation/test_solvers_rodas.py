@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from hdsim.kernel import system as system_kernel
 from hdsim.simulation import _rodas as c
-from hdsim.simulation.rosenbrock import Rodas4, bare_rodas4
+from hdsim.simulation.rosenbrock import Rodas4, rodas4_through
 from hdsim.simulation.system import System
 
 
@@ -173,11 +173,11 @@ def test_samples_are_as_good_as_the_ends_of_the_steps():
 
 def test_bare_loop_is_the_same_method():
     system, t = pendulum(), np.linspace(0.0, 20.0, 101)
-    samples, end, steps = bare_rodas4(system, 0.0, 20.0, system.y0, t, rtol=1e-7, atol=1e-9)
+    bare = rodas4_through(system, np.array([0.0, 20.0]), system.y0, t, rtol=1e-7, atol=1e-9)
     through_scipy = solve(system, t_eval=t)
-    np.testing.assert_array_equal(samples, through_scipy.y)
-    np.testing.assert_array_equal(end, through_scipy.y[:, -1])
-    assert steps == through_scipy.njev
+    np.testing.assert_array_equal(bare.y, through_scipy.y)
+    np.testing.assert_array_equal(bare.y_end, through_scipy.y[:, -1])
+    assert bare.statistics.steps == through_scipy.njev
 
 
 def test_large_dense_systems_are_solved_with_pivoting():

@@ -1,0 +1,96 @@
+"""Some channels of a model at given times, in one compiled call: what a fit asks for a thousand times.
+
+The steps are those of ``Run``; nothing is logged, watched or audited, and only what is asked for is computed.
+A model that is built with ``audited=False`` does not even integrate its energies, whose accuracy would
+otherwise set the step (a torque ripple's power is quicker than anything that moves).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.drive import _layout as a
+from hdsim.recording import Column, Table
+from hdsim.simulation.channels import Observer
+from hdsim.simulation.failures import FASTEST, speed_guard, told
+from hdsim.simulation.run import RunFailed
+from hdsim.simulation.spans import cuts, stops
+
+if TYPE_CHECKING:
+    from hdsim.drive.model import Model
+
+Array = NDArray[np.float64]
+
+
+def sample(model: Model, times: Array, channels: Sequence[str], *, rtol: float = 1e-6) -> dict[str, Array]:
+    """Run a model from rest at time 0 to the last of the times.
+
+    Args:
+        model: the drive with its parts.
+        times: when the channels are wanted, shape (m,), s, increasing, not before 0.
+        channels: names in ``Observer.formulas``, or of states that parts add.
+        rtol: relative tolerance; absolute: times each state's scale.
+
+    Returns:
+        The channels, shape (m,) each; beside those with a sensor what it reads, as ``measured_...``.
+
+    Raises:
+        InputError: there is no such channel.
+        RunFailed: the integration stopped before the end; the message says why.
+    """
+    from hdsim.simulation.rosenbrock import rodas4_through
+
+    times = np.ascontiguousarray(times, dtype=np.float64)
+    observer = Observer(model)
+    sensors = {c: s for c, s in model.sensors.items() if c in channels}
+    needed = {name for chain in sensors.values() for sensor in chain for name in sensor.needs}
+    asked = tuple(dict.fromkeys([*channels, *sorted(needed), "motor_velocity"]))
+    grid = _reaching_back(times, observer.memory) if sensors else times
+
+    system, end = model.system, float(times[-1])
+    spans = cuts(model.signals, end)
+    found = rodas4_through(
+        system,
+        spans,
+        system.y0,
+        grid,
+        rtol=rtol,
+        atol=rtol * system.scale,
+        stops=stops(model, end),
+        inside_at=a.INSIDE,
+        guard=speed_guard(model),
+    )
+    if not found.success:
+        raise RunFailed(told(model, found))
+    # A sample at a cut belongs to the span before it, as in the integration.
+    span = np.clip(np.searchsorted(spans, grid, side="left") - 1, 0, len(spans) - 2)
+    inside = 0.5 * (spans[span] + spans[span + 1])
+    true = observer.values(asked, grid, found.y.T, inside)
+    if np.max(np.abs(true["motor_velocity"])) > FASTEST:  # where it is prescribed, no state tells
+        raise RunFailed(f"RunawayError: motor velocity exceeds {FASTEST:g} rad/s.")
+    at = slice(None) if grid is times else np.searchsorted(grid, times)
+    read = {}
+    if sensors:
+        history = Table(grid, {name: Column(values, "") for name, values in true.items()})
+        read = {name: column.values for name, column in observer.sensed(history, times, sensors).items()}
+    return {name: true[name][at] for name in channels} | read
+
+
+def _reaching_back(times: Array, memory_s: float) -> Array:
+    """The times with others between and before them, as close, where sensors look back into the past."""
+    if memory_s == 0.0 or len(times) < 2:
+        return times
+    period = float(np.median(np.diff(times)))
+    first = max(0.0, times[0] - memory_s - 2.0 * period)
+    count = math.ceil((times[-1] - first) / period)
+    even = times[-1] - period * np.arange(count, 0, -1.0)
+    even = even[even >= 0.0]
+    after = np.clip(np.searchsorted(times, even), 1, len(times) - 1)
+    # Nothing is gained beside a time that is asked for.
+    apart = np.minimum(np.abs(times[after] - even), np.abs(even - times[after - 1])) > 0.4 * period
+    return np.sort(np.concatenate([times, even[apart]]))
