@@ -1,8 +1,8 @@
 """What a family of blind plants hands over: a drawn case with its records, its base model and its truth.
 
-A family is a module with one function ``draw(number, seed) -> Case``: everything about the case follows from the two
-numbers. It shares no code with what diagnoses; hdsim may be used to write the base's YAML, and by the family
-whose plant is hdsim's own toothed drive.
+A family is a module ``family_NAME`` with one function ``draw(number, seed) -> Case``: everything about the
+case follows from the two numbers. It shares no code with what diagnoses; hdsim may be used to write the base
+as YAML, and by the family whose plant is hdsim's own toothed drive.
 """
 
 from __future__ import annotations
@@ -11,6 +11,11 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+
+
+class AbsentError(Exception):
+    """What a family needs (a package, recordings) is not here; the message says what."""
+
 
 Kind = Literal["null", "parameter", "effect", "pair", "outside"]
 
@@ -47,11 +52,12 @@ class Case:
         load: where the load's torque comes from (``None``: the default).
         strength: for each hidden thing, root-mean-square of its trace over the noise, in the channel where
             it shows most, beyond what the base's own numbers can absorb.
-        numbers: true values by path (``drive.friction.coulomb_nm``, or a field of the hidden effect) where the
-            truth's formula is the catalogue's.
+        numbers: true values by path (``drive.friction.coulomb_nm``, or a field of the hidden effect) where
+            the truth's formula is the catalogue's.
         setup: what was drawn: ``rate_hz``, ``encoder_step_over_noise``, ``sensors`` (``motor``, ``both``,
-            ``torque sensor``, ``known load``), ``seconds``, ``records``, ``held`` (``stretches``, ``files``), ``motion``,
-            ``temperature`` (bool), ``formula`` (``catalogue``, ``other``), and what the family adds.
+            ``torque sensor``, ``known load``), ``seconds``, ``records``, ``held`` (``stretches``, ``files``),
+            ``motion``, ``temperature`` (bool), ``formula`` (``catalogue``, ``other``), and what the family
+            adds.
     """
 
     key: str
