@@ -1,24 +1,23 @@
-"""Run the blind matrix and write it whole; ``python tests/blind --help``."""
+"""Blind tests of the diagnosis: ``python tests/blind --help``."""
 
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
+import importlib
 import json
-import multiprocessing
-import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from cases import Trial, trials
-from judging import attempt
-from matrix import page
+from contract import AbsentError
+from judging import Line, outcome, said
+from running import FAMILIES, Task, attempt, family, lines_of, run, stored, task_of
+
+#: Never used to calibrate, whatever its seeds: what is stated of it, no rule has seen.
+LEFT_OUT = "mujoco"
 
 
-def seeds_of(text: str) -> list[int]:
-    """``100-103`` or ``0,2`` as numbers."""
+def numbers_of(text: str) -> list[int]:
+    """``0-49`` or ``0,2`` as numbers."""
     found: list[int] = []
     for part in text.split(","):
         first, _, last = part.partition("-")
@@ -26,98 +25,125 @@ def seeds_of(text: str) -> list[int]:
     return found
 
 
-def wanted(given: argparse.Namespace) -> list[Trial]:
-    """The trials that were asked for."""
-    if given.only:
-        seed = int(given.only.rpartition("/")[2])
-        return [t for t in trials([seed]) if t.key == given.only]
-    groups = set(given.groups.split(",")) if given.groups else None
-    found = [t for t in trials(seeds_of(given.seeds)) if groups is None or t.group in groups]
-    return [t for t in found if given.match in t.key]
-
-
-def done(path: Path | None, keys: set[str]) -> dict[str, dict[str, Any]]:
-    """Results of an earlier run, by key; a line that was cut off is left out."""
-    found = {}
-    if path is not None and path.exists():
-        for line in path.read_text(encoding="utf-8").splitlines():
-            try:
-                result = json.loads(line)
-            except json.JSONDecodeError:
-                continue
-            if result["key"] in keys:
-                found[result["key"]] = result
-    return found
-
-
-def run(todo: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
-    """Results as they come."""
-    if jobs == 1:
-        yield from map(attempt, todo)
-        return
-    # One thread a process: the processes are what runs side by side.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        for future in concurrent.futures.as_completed([pool.submit(attempt, trial) for trial in todo]):
-            yield future.result()
-
-
-def line_of(result: dict[str, Any]) -> str:
+def line_of(line: Line) -> str:
     """A result in a line."""
-    sizes = " ".join(f"{s[1]:.1f}({s[0]:.1f})" for s in result["strength"]) or "-"
+    setup = line["setup"]
+    seconds = setup.get("seconds", 0.0)
+    total = sum(seconds) if isinstance(seconds, list) else seconds
     return " | ".join(
         [
-            f"{result['key']}: {'right' if result['right'] else 'WRONG'}",
-            result.get("error") or result["said"],
-            result["setup"],
-            f"strength {sizes}",
-            f"closed {result.get('closed')}",
-            f"{result['made_s']:.0f} + {result['seconds']:.0f} s",
+            f"{line['key']}: {outcome(line)}",
+            said(line),
+            f"{setup.get('sensors', '')}, {setup.get('rate_hz', 0):.0f} Hz, {total:.0f} s",
+            f"held {setup.get('held', '')}",
+            f"strength {' '.join(f'{s:.1f}' for s in line['strength']) or '-'}",
+            f"closed {line.get('closed')}",
+            f"{line.get('made_cpu_s', 0):.0f} + {line.get('cpu_s', 0):.0f} s",
         ]
     )
+
+
+def run_all(given: argparse.Namespace) -> None:
+    """Run the cases that were asked for and are not stored yet."""
+    wanted = []
+    for name in given.families.split(","):
+        try:
+            family(name)
+        except AbsentError as missing:
+            print(f"skipped: {missing}")
+            continue
+        wanted += [Task(name, n, seed) for seed in numbers_of(given.seed) for n in numbers_of(given.numbers)]
+    given.results.parent.mkdir(parents=True, exist_ok=True)
+    known = {Task(r["family"], r["number"], r["seed"]) for r in lines_of([given.results])}
+    todo = [task for task in wanted if task not in known]
+    print(f"{len(wanted)} cases, {len(wanted) - len(todo)} of them known", flush=True)
+    started = time.perf_counter()
+    for count, line in enumerate(run(todo, given.jobs), 1):
+        left = (time.perf_counter() - started) / count * (len(todo) - count) / 60
+        if isinstance(line, AbsentError):
+            print(f"[{count}/{len(todo)}] skipped: {line}", flush=True)
+            continue
+        with given.results.open("a", encoding="utf-8") as file:
+            file.write(stored(line) + "\n")
+        print(f"[{count}/{len(todo)}, {left:.0f} min left] {line_of(line)}", flush=True)
+
+
+def one(given: argparse.Namespace) -> None:
+    """Run one case again and print what comes of it."""
+    line = attempt(task_of(given.key))
+    print(json.dumps(json.loads(stored(line | {"evidence": None})), indent=1))
+    print(line_of(line))
+
+
+def show(given: argparse.Namespace) -> None:
+    """Print stored lines of a key, or of all keys that hold the text."""
+    found = [line for line in lines_of(given.results) if given.key in line["key"]]
+    for line in found:
+        if line["key"] == given.key or len(found) == 1:
+            print(json.dumps(line | {"evidence": None}, indent=1))
+        print(line_of(line))
+    if not found:
+        raise SystemExit(f"no stored case has {given.key} in its key")
+
+
+def page(given: argparse.Namespace) -> None:
+    """Write the page of stored cases, and the picture beside it."""
+    import page as pages
+
+    lines = lines_of(given.results)
+    given.write.write_text(pages.page(lines), encoding="utf-8")
+    pages.reliability_picture(lines, given.write.parent / "images" / "reliability.png")
+    print(f"{len(lines)} cases: {given.write}")
+
+
+def calibrate(given: argparse.Namespace) -> None:
+    """Hand the lines that rules may be calibrated on to ``calibrate.calibrate``."""
+    lines = lines_of(given.results)
+    refused = sorted({line["key"] for line in lines if line["family"] == LEFT_OUT or line["seed"] % 2})
+    if refused:
+        raise SystemExit(
+            f"{len(refused)} of {len(lines)} cases must not calibrate anything (the {LEFT_OUT} family is "
+            f"left out, odd seeds are for the statement): {', '.join(refused[:3])}"
+        )
+    importlib.import_module("calibrate").calibrate(lines)
 
 
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(prog="python tests/blind", description=__doc__)
-    parser.add_argument("--seeds", default="100-102", help="e.g. 100-102 or 0,2 (below 100: development)")
-    parser.add_argument("--groups", default="", help="comma-separated; all without it")
-    parser.add_argument("--match", default="", help="only cases whose key contains this")
-    parser.add_argument("--only", default="", help="one case: group/truth/seed")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--results", type=Path, help="JSON-lines file: cases in it are not run again")
-    parser.add_argument("--write", type=Path, help="write the page here")
-    parser.add_argument("--known", action="store_true", help="run nothing, report what --results holds")
-    parser.add_argument("--list", action="store_true", help="only list the keys")
+    commands = parser.add_subparsers(required=True)
+
+    def paths(text: str) -> list[Path]:
+        return [Path(part) for part in text.split(",")]
+
+    command = commands.add_parser("run", help="draw cases, diagnose them, store a line each")
+    command.add_argument("--families", default=",".join(FAMILIES))
+    command.add_argument("--numbers", default="0-49", help="e.g. 0-49 or 3,7")
+    command.add_argument(
+        "--seed", default="1", help="even: calibration, odd: statement; several as for --numbers"
+    )
+    command.add_argument("--jobs", type=int, default=1, help="processes")
+    command.add_argument("--results", type=Path, default=Path("results/blind.jsonl"),
+                         help="JSON-lines file: cases in it are not run again")  # fmt: skip
+    command.set_defaults(run=run_all)
+    command = commands.add_parser("one", help="run one case again, print the verdict")
+    command.add_argument("key", help="family/kind/truth/number/seed")
+    command.set_defaults(run=one)
+    for name, call, text in (
+        ("show", show, "print stored cases whose key holds the text"),
+        ("page", page, "write the page"),
+        ("calibrate", calibrate, "calibrate rules on stored cases of even seeds"),
+    ):
+        command = commands.add_parser(name, help=text)
+        if name == "show":
+            command.add_argument("key")
+        if name == "page":
+            command.add_argument("--write", type=Path, default=Path("docs/blind.md"))
+        command.add_argument("--results", type=paths, default=[Path("results/blind.jsonl")],
+                             help="files, comma-separated")  # fmt: skip
+        command.set_defaults(run=call)
     given = parser.parse_args()
-    chosen = wanted(given)
-    if not chosen:
-        parser.error("no case fits")
-    if given.list:
-        print("\n".join(t.key for t in chosen))
-        return
-    results = done(given.results, {t.key for t in chosen})
-    if given.known:
-        chosen = [t for t in chosen if t.key in results]
-    todo = [t for t in chosen if t.key not in results]
-    print(f"{len(chosen)} cases, {len(results)} of them known", flush=True)
-    started = time.perf_counter()
-    for number, result in enumerate(run(todo, given.jobs), 1):
-        results[result["key"]] = result
-        if given.results:
-            with given.results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(result, default=float) + "\n")
-        left = (time.perf_counter() - started) / number * (len(todo) - number) / 60
-        print(f"[{number}/{len(todo)}, {left:.0f} min left] {line_of(result)}", flush=True)
-        if given.only:
-            print(json.dumps(result, indent=1, default=float))
-    text = page([results[t.key] for t in chosen])
-    if given.write:
-        given.write.write_text(text, encoding="utf-8")
-    if not given.only:
-        print(text)
+    given.run(given)
 
 
 if __name__ == "__main__":

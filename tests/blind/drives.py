@@ -6,7 +6,7 @@ ratios from -160 to -50, and +101 with the circular spline as output); the senso
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,8 @@ class Drive:
     arm: float  # N m, weight times lever of the arm, where the load is one
     top_speed: float  # rad/s of the motor
     circular_spline_output: bool = False
-    algebraic_sign: bool = False  # w / sqrt(w^2 + w0^2) instead of the hyperbolic tangent
     output_noise: float = 4e-6  # rad
-    output_counts: float = 2.0**22
-    motor_counts: float = 65536.0
+    motor_noise: float = 4e-5  # rad
 
     @property
     def ratio(self) -> float:
@@ -51,18 +49,44 @@ class Drive:
 
 DRIVES = (
     Drive("size 20, -100", 200, (1.6e4, 2.5e4, 2.9e4), (7.0, 25.0), 6.93e-5, 0.5, 8.0, 0.03, 3.5e-4, 0.06,
-          12.0, 90.0, algebraic_sign=True),
+          12.0, 90.0),
     Drive("size 14, -50", 100, (3.4e3, 4.7e3, 5.7e3), (2.0, 6.9), 1.4e-5, 0.035, 0.6, 0.012, 9e-5, 0.08,
-          2.6, 75.0, output_noise=1e-5, output_counts=2.0**20),
+          2.6, 75.0, output_noise=1e-5),
     Drive("size 17, -80", 160, (1.0e4, 1.4e4, 1.6e4), (3.9, 12.0), 3.3e-5, 0.15, 3.0, 0.02, 2e-4, 0.07,
-          6.0, 90.0, output_noise=6e-6, motor_counts=2.0**15),
+          6.0, 90.0, output_noise=6e-6),
     Drive("size 25, -120", 240, (3.1e4, 5.0e4, 5.7e4), (14.0, 48.0), 1.6e-4, 1.6, 15.0, 0.045, 6e-4, 0.05,
-          25.0, 100.0, algebraic_sign=True, output_counts=2.0**23, motor_counts=2.0**17),
+          25.0, 100.0),
     Drive("size 32, +101", 200, (6.7e4, 1.1e5, 1.2e5), (29.0, 108.0), 5.0e-4, 5.0, 40.0, 0.08, 1.2e-3, 0.09,
           60.0, 80.0, circular_spline_output=True),
     Drive("size 40, -160", 320, (1.3e5, 2.1e5, 2.5e5), (54.0, 196.0), 1.2e-3, 12.0, 90.0, 0.13, 2.2e-3, 0.06,
-          130.0, 110.0, output_noise=3e-6, output_counts=2.0**23),
+          130.0, 110.0, output_noise=3e-6),
 )  # fmt: skip
+
+#: Factors on a drive's inertia, stiffness and friction numbers.
+LEAST_FACTOR, MOST_FACTOR = 0.6, 1.7
+
+
+def around(drive: Drive, draws: tuple[float, ...]) -> Drive:
+    """Another drive of the same size.
+
+    Args:
+        drive: the middle.
+        draws: eight, uniform in 0 to 1.
+    """
+    f = [LEAST_FACTOR * (MOST_FACTOR / LEAST_FACTOR) ** draw for draw in draws]
+    k1, k2, k3 = drive.stiffness
+    return replace(
+        drive,
+        stiffness=(k1 * f[0], k2 * f[0], k3 * f[0]),
+        motor_inertia=drive.motor_inertia * f[1],
+        load_inertia=drive.load_inertia * f[2],
+        damping=drive.damping * f[3],
+        coulomb=drive.coulomb * f[4],
+        viscous=drive.viscous * f[5],
+        load_loss=drive.load_loss * f[6],
+        arm=drive.arm * f[7],
+    )
+
 
 #: Speed over which the sign of Coulomb friction is smoothed, rad/s of the motor: moving, output locked.
 SIGN_SPEED, LOCKED_SIGN_SPEED = 0.5, 0.05

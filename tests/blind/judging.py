@@ -1,180 +1,150 @@
-"""What a diagnosis says of a blind case, and whether that is right.
-
-Only the log and the base are handed over.
-"""
+"""Whether what a diagnosis says of a blind case is right, from stored lines: it can be asked again."""
 
 from __future__ import annotations
 
-import tempfile
-import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import Case, Trial, case_of
-from drives import base_yaml
-from hidden import KNOWN
-from sensing import Log, measure, numbers
+from contract import Case
 
-import hdsim
-from hdsim.diagnose.verdict import Verdict
-from hdsim.diagnose.workflow import diagnose
-from hdsim.errors import InputError
-from hdsim.estimate.records import Record, record_from
-from hdsim.scenario import Scenario
+Line = dict[str, Any]
 
 #: Most names that a group of indistinguishable effects may have to count.
 MOST_NAMES = 3
-MAPPING = "time: {column: time, unit: s, quantised: true}\nchannels:\n"
+#: What can come of a case.
+OUTCOMES = ("right", "wrong name", "unknown", "nothing", "error")
+#: A held-out gap this much above what is possible can be closed.
+CLOSABLE = 1.1
 
 
-def base_of(case: Case) -> Scenario:
-    """The base model of a case, from its YAML text."""
-    setup = case.setup
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "base.yaml"
-        text = base_yaml(setup.drive, gravity=setup.gravity, locked=setup.locked, lacks=setup.lacks)
-        path.write_text(text, encoding="utf-8")
-        return hdsim.load_scenario(path)
+def groups(line: Line) -> list[list[str]]:
+    """Names that were given, a group of indistinguishable ones each, in the order of the verdict."""
+    effects = line["verdict"]["effects"] if line["verdict"] else []
+    return [sorted({e["name"], *e["indistinguishable_from"]}) for e in effects]
 
 
-def record_of(case: Case, log: Log) -> Record:
-    """The log as a record; one with repeated stamps goes through the import, as a user's would."""
-    if case.setup.dirt != "coarse clock":
-        return Record("blind", log.time, dict(log.channels))
-    with tempfile.TemporaryDirectory() as folder:
-        table = Path(folder) / "log.csv"
-        rows = np.column_stack([log.time, *log.channels.values()])
-        np.savetxt(
-            table, rows, delimiter=",", header=",".join(["time", *log.channels]), comments="", fmt="%.17g"
-        )
-        mapping = Path(folder) / "mapping.yaml"
-        lines = []
-        for name in log.channels:
-            side = name.partition("_")[0]
-            unit = {"angle": "rad", "torque": "N m"}[name.rpartition("_")[2]]
-            lines.append(f"  {name}: {{column: {name}, unit: {unit}, side: {side}}}\n")
-        mapping.write_text(MAPPING + "".join(lines), encoding="utf-8")
-        return record_from(hdsim.import_recording(table, mapping))
+def said(line: Line) -> str:
+    """A verdict in a few words."""
+    if not line["verdict"]:
+        return str(line["error"])
+    return " + ".join([line["verdict"]["verdict"], *("/".join(group) for group in groups(line))])
 
 
-def attempt(trial: Trial) -> dict[str, Any]:
-    """Make a case, diagnose it, and judge: everything that the report needs, as JSON."""
-    started = time.perf_counter()
-    case = case_of(trial)
-    log = measure(case.setup, numbers(case.setup, case.changes))
-    found: dict[str, Any] = {
-        "key": trial.key, "group": trial.group, "row": trial.row, "seed": trial.seed,
-        "setup": case.setup.text, "changes": case.changes, "reached": case.reached,
-        "strength": [[round(s.plain, 3), round(s.beyond_base, 3), s.channel] for s in case.strengths],
-        "made_s": round(time.perf_counter() - started, 1),
-    }  # fmt: skip
-    started = time.perf_counter()
-    try:
-        diagnosis = diagnose([record_of(case, log)], base_of(case))
-        verdict, last = diagnosis.verdict, diagnosis.stages[-1].location
-    except (InputError, ArithmeticError, ValueError, IndexError, KeyError) as error:
-        # A diagnosis that stops is a wrong answer and is listed as one.
-        words = f"{type(error).__name__}: {error}".splitlines()[0][:300]
-        found |= {
-            "said": type(error).__name__,
-            "verdict": "error",
-            "names": [],
-            "right": False,
-            "error": words,
-        }
-        return found | {"seconds": round(time.perf_counter() - started, 1)}
-    names = [sorted({e.name, *e.indistinguishable_from}) for e in verdict.effects]
-    found |= {
-        "verdict": verdict.verdict, "names": names, "first": [e.name for e in verdict.effects],
-        "said": " + ".join([verdict.verdict, *("/".join(group) for group in names)]),
-        "suspects": verdict.suspects, "moved": verdict.moved,
-        "problems": sorted({p.kind for p in verdict.data_problems}),
-        "right": judge(trial, verdict.verdict, names),
-        "closed": closed(verdict, log),
-        "covered": covered(case, verdict),
-        "explained": round(diagnosis.explained, 4),
-        "left": [round(last.structured, 4), round(last.chance, 4)],
-        "gap": {c: [g.before, g.refit, g.after, g.noise] for c, g in verdict.gap.items()},
-        "seconds": round(time.perf_counter() - started, 1),
-    }  # fmt: skip
-    return found
+def outcome(line: Line) -> str:
+    """One of ``OUTCOMES``; ``wrong name`` of a case in which nothing is hidden is a false alarm.
+
+    ``nothing`` is any verdict without a name that isn't ``unknown``: a number that is said to be off, too.
+    """
+    if not line["verdict"]:
+        return "error"
+    verdict, names, truth = line["verdict"]["verdict"], groups(line), [set(t) for t in line["truth"]]
+    kind = line["kind"]
+    if kind == "null":
+        right = verdict in ("nothing", "parameter")
+    elif kind == "parameter":
+        right = verdict == "parameter"
+    elif kind == "outside":
+        right = verdict == "unknown"
+    elif kind == "pair":
+        right = all(any(_holds(group, wanted) for group in names) for wanted in truth)
+    else:
+        right = bool(names) and _holds(names[0], truth[0])
+    if right:
+        return "right"
+    if names:
+        return "wrong name"
+    return "unknown" if verdict == "unknown" else "nothing"
 
 
-def judge(trial: Trial, verdict: str, names: list[list[str]]) -> bool:
-    """Whether the answer is right; a group counts when it holds the truth and has at most three names."""
-    if trial.group == "outside":
-        return verdict == "unknown"
-    if trial.parameters:
-        return verdict == "parameter"
-    if not trial.effects:
-        return verdict in ("nothing", "parameter")
-    if trial.group == "faint":
-        # Silence is allowed, a wrong name is not.
-        return not names or _holds(names[0], trial.accepted[0])
-    if not names:
-        return False
-    if trial.group == "pair":
-        return all(any(_holds(group, wanted) for group in names) for wanted in trial.accepted)
-    return _holds(names[0], trial.accepted[0])
-
-
-def _holds(group: list[str], wanted: frozenset[str]) -> bool:
+def _holds(group: list[str], wanted: set[str]) -> bool:
     return len(group) <= MOST_NAMES and bool(set(group) & wanted)
 
 
-def closed(verdict: Verdict, log: Log) -> float | None:
+def false_name(line: Line) -> bool:
+    """Whether the first name given is none of the truth's, in a group however large."""
+    names = groups(line)
+    truth = {name for wanted in line["truth"] for name in wanted}
+    return bool(names) and not set(names[0]) & truth
+
+
+def false_alarm(line: Line) -> bool:
+    """Whether something is said to be missing; for cases in which nothing is."""
+    return line["verdict"] is None or line["verdict"]["verdict"] in ("effect", "unknown")
+
+
+def stated(line: Line) -> float | None:
+    """Confidence that the verdict states: its own, else that of its first name; ``None`` without one."""
+    verdict = line["verdict"] or {}
+    if verdict.get("confidence") is not None:
+        return float(verdict["confidence"])
+    return float(verdict["effects"][0]["confidence"]) if verdict.get("effects") else None
+
+
+def closed(case: Case, gap: dict[str, Any]) -> float | None:
     """Share of the held-out gap after the re-fit that was closed, of what noise leaves to close.
 
-    Of the channel whose gap over its best possible is largest. The best possible is what the log differs from
-    ideal sensors in the plant. None where less than a tenth of the gap is more than noise.
+    Of the channel whose gap over its best possible is largest. The best possible is what the held-out log
+    differs from ideal sensors in the plant, the channel's noise where that isn't known. ``None`` where
+    less than a tenth of the gap is more than that.
+
+    Args:
+        case: the case.
+        gap: the verdict's, by channel.
     """
     best: tuple[float, float] | None = None
-    for channel, gap in verdict.gap.items():
-        rest = (log.channels[channel] - log.ideal[channel])[~log.spoilt]
-        floor = float(np.nanstd(rest))
-        if gap.refit < 1.1 * floor:
+    for channel, own in gap.items():
+        floor = _floor(case, channel) or own["noise"]
+        if not floor or own["refit"] < CLOSABLE * floor:
             continue
-        excess = gap.refit / floor
+        excess = own["refit"] / floor
         if best is None or excess > best[0]:
-            best = (excess, (gap.refit - gap.after) / (gap.refit - floor))
+            best = (excess, (own["refit"] - own["after"]) / (own["refit"] - floor))
     return None if best is None else round(best[1], 4)
 
 
-def covered(case: Case, verdict: Verdict) -> list[list[Any]]:
-    """For every number that should be recovered: its path, truth, value, interval, whether it holds."""
-    if case.trial.parameters and case.setup.algebraic_sign:
-        return []  # the formula of its friction isn't the model's
-    if case.trial.parameters:
-        given = verdict.parameters
-    elif case.expected:
-        name = case.trial.effects[0]
-        own = name if name in KNOWN[name].accepted or not KNOWN[name].accepted else KNOWN[name].accepted[0]
-        given = next((e.parameters for e in verdict.effects if e.name == own), {})
-    else:
-        return []
+def _floor(case: Case, channel: str) -> float | None:
+    squares = [
+        float(np.nanvar(record.channels[channel] - record.ideal[channel]))
+        for record in (case.holdout or case.records)
+        if channel in record.ideal and channel in record.channels
+    ]
+    return float(np.sqrt(np.mean(squares))) if squares else None
+
+
+def covered(case: Case, verdict: dict[str, Any]) -> list[list[Any]]:
+    """For every true number that was fitted: its path, truth, value, interval's ends, whether it holds.
+
+    Args:
+        case: the case.
+        verdict: as JSON.
+    """
+    known = set().union(*case.truth)
+    named = [e["parameters"] for e in verdict["effects"] if e["name"] in known]
     rows: list[list[Any]] = []
-    for path, truth in case.expected.items():
-        number = given.get(_same_order(path, case.expected, given))
-        if number is None or number.interval is None:
-            continue
-        low, high = number.interval
-        value, inside = number.value, low <= truth <= high
-        if path.endswith("_deg"):
-            passes = 180.0 if path == "position_deg" else 360.0
-            truth = value + (truth - value + passes / 2) % passes - passes / 2
-            inside = low <= truth <= high
-        rows.append([path, truth, value, low, high, bool(inside)])
+    for path, truth in case.numbers.items():
+        for given in (verdict["parameters"], *named):
+            number = given.get(_same_order(path, case.numbers, given))
+            if number is not None and number["interval"] is not None:
+                rows.append(_row(path, truth, number["value"], *number["interval"]))
+                break
     return rows
 
 
-def _same_order(path: str, expected: dict[str, float], given: Any) -> str:
+def _row(path: str, truth: float, value: float, low: float, high: float) -> list[Any]:
+    if path.endswith("_deg"):
+        # An angle is one of many; a tooth meets the wave generator twice a turn.
+        turn = 180.0 if path == "position_deg" else 360.0
+        truth = value + (truth - value + turn / 2) % turn - turn / 2
+    return [path, truth, value, low, high, bool(low <= truth <= high)]
+
+
+def _same_order(path: str, expected: dict[str, float], given: dict[str, Any]) -> str:
     """Path of the fitted harmonic whose order is that of the expected one."""
     section, _, last = path.rpartition(".")
     order = expected.get(f"{section}.order")
     if order is None:
         return path
     for other in given:
-        if other.endswith(".order") and abs(given[other].value - order) < 0.01 * order:
+        if other.endswith(".order") and abs(given[other]["value"] - order) < 0.01 * order:
             return f"{other.removesuffix('.order')}.{last}"
     return path

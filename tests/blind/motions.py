@@ -9,22 +9,36 @@ from __future__ import annotations
 import numpy as np
 from drives import Drive
 
-#: Rate of the controller and of the plant's own clock, Hz.
-CONTROL_RATE = 2000
+#: Rate of the controller and of the plant's own clock, Hz; a log's rate divides it.
+CONTROL_RATE = 10000
 
-KINDS = ("swing", "moves", "chirp", "constant", "locked")
+KINDS = ("swing", "moves", "chirp", "constant", "multisine", "locked")
 
 
-def reference(kind: str, drive: Drive, seconds: float, seed: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Angle and speed at the output, shape (n,) each; of the twist where the output is locked."""
+def reference(
+    kind: str, drive: Drive, seconds: float, seed: list[int], share: float = 1.0, softest: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Angle and speed at the output, shape (n,) each; of the twist where the output is locked.
+
+    Args:
+        kind: of motion.
+        drive: its top speed and torques size the motion.
+        seconds: length.
+        seed: of what varies.
+        share: factor on the twist where the output is locked.
+        softest: speeds are a moving mean over at least this, s.
+    """
     rng = np.random.default_rng(seed)
     t = np.arange(round(seconds * CONTROL_RATE)) / CONTROL_RATE
     top = drive.top_speed / abs(drive.ratio)
     speed = {
-        "swing": _swing, "moves": _moves, "chirp": _chirp, "constant": _constant, "locked": _locked,
+        "swing": _swing, "moves": _moves, "chirp": _chirp, "constant": _constant, "multisine": _multisine,
+        "locked": _locked,
     }[kind](t, top, rng)  # fmt: skip
     if kind == "locked":
-        speed *= _locked_twist(drive) * rng.uniform(0.9, 1.1)
+        speed *= _locked_twist(drive) * rng.uniform(0.9, 1.1) * share
+    if softest > 0:
+        speed = _rounded(_rounded(speed, softest), softest)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / CONTROL_RATE
     return angle, speed
 
@@ -73,6 +87,14 @@ def _constant(t: np.ndarray, top: float, rng: np.random.Generator) -> np.ndarray
     return speed
 
 
+def _multisine(t: np.ndarray, top: float, rng: np.random.Generator) -> np.ndarray:
+    """Six sines from 0.05 to 2 Hz with random phases, the slow ones larger; begins from rest."""
+    speed = np.zeros_like(t)
+    for frequency in 0.05 * 40.0 ** rng.uniform(0.0, 1.0, 6):
+        speed += frequency**-0.3 * np.sin(2 * np.pi * frequency * t + rng.uniform(0.0, 2 * np.pi))
+    return (1.0 - np.exp(-t / 0.3)) * top * rng.uniform(0.7, 1.0) * speed / np.abs(speed).max()
+
+
 def _locked(t: np.ndarray, top: float, rng: np.random.Generator) -> np.ndarray:
     """Ramps of the twist against a locked output: full cycles and smaller ones inside; unit amplitude."""
     del top
@@ -93,7 +115,7 @@ def _locked_twist(drive: Drive) -> float:
 
 
 def _rounded(values: np.ndarray, seconds: float) -> np.ndarray:
-    """A moving mean over ``seconds``, so that neither the controller nor a log at 500 Hz meets a jump."""
+    """A moving mean over ``seconds``, so that neither the controller nor the log meets a jump."""
     width = max(round(seconds * CONTROL_RATE), 1)
     padded = np.pad(values, (width, width), mode="edge")
     return np.convolve(padded, np.ones(width) / width, mode="same")[width:-width]

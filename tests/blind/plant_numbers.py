@@ -90,6 +90,12 @@ class Numbers(NamedTuple):
     load_form: float = 0.0
     weight: float = 0.0
     weight_phase: float = 0.0
+    # torque that a bench puts on the output, over time
+    known_a: float = 0.0
+    known_a_hz: float = 0.3
+    known_b: float = 0.0
+    known_b_hz: float = 1.0
+    known_phase: float = 0.0
     # spring
     gap: float = 0.0
     gap_rounding: float = 0.0

@@ -1,7 +1,7 @@
 """Plants with a hidden effect, written apart from hdsim: own equations, own integrator.
 
 Coordinates are motor angle m, output angle o, the housing's angle b and a spring-mounted mass a; a cascaded
-PI controller follows a reference at 2 kHz. Nothing here imports hdsim. Units are SI.
+PI controller follows a reference at 10 kHz. Nothing here imports hdsim. Units are SI.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ import numpy as np
 from motions import CONTROL_RATE
 from numba import njit
 from plant_numbers import Numbers
+from plant_springs import SLIDERS, bristle_after, slider, slipped, spring_table, spring_torque
 
-STEPS = 10  # of the integrator in each period of the controller
+STEPS = 2  # of the integrator in each period of the controller
 STEP = 1.0 / (CONTROL_RATE * STEPS)  # s
-SLIDERS = 12
-TABLE = 20001  # entries of the spring's table
 
 
 @njit(cache=True)
@@ -65,43 +64,6 @@ def error_of(m, o, p):
         by_m += p.bump * slope
         by_o -= p.bump_output * p.bump * slope
     return e, by_m, by_o
-
-
-@njit(cache=True)
-def spring_torque(d, table, reach, p):
-    """The gap takes its width first, then the table of the springs in series; a cubic is parallel."""
-    torque = 0.0
-    if p.cubic > 0:
-        if p.cubic_form > 0:
-            torque = p.cubic * d * d * d
-        else:
-            # 6 s^3 (sinh(d/s) - d/s) = d^3 + d^5/(20 s^2) + ...
-            torque = 6 * p.cubic * p.cubic_scale**3 * (math.sinh(d / p.cubic_scale) - d / p.cubic_scale)
-    if p.gap > 0:
-        half = 0.5 * p.gap
-        if p.gap_rounding > 0:
-            s = p.gap_rounding * p.gap
-            d += 0.5 * (math.sqrt((d - half) ** 2 + s * s) - math.sqrt((d + half) ** 2 + s * s))
-        else:
-            d = math.copysign(max(0.0, abs(d) - half), d)
-    place = (d / reach + 1.0) * 0.5 * (len(table) - 1)
-    k = min(max(int(place), 0), len(table) - 2)
-    return torque + table[k] + (place - k) * (table[k + 1] - table[k])
-
-
-@njit(cache=True)
-def bristle_after(z, speed, s, p):
-    """Bristle deflection after the time ``s`` at a speed, and the rate at which it relaxes."""
-    if p.bristle_form > 0:
-        fall = math.exp(-((speed / p.bristle_speed) ** 2))
-    else:
-        fall = math.exp(-abs(speed / p.bristle_speed))
-    level = p.bristle_coulomb + (p.bristle_static - p.bristle_coulomb) * fall
-    rate = p.bristle * abs(speed) / level
-    if rate * s < 1e-9:
-        return z + speed * s, rate
-    decay = math.exp(-rate * s)
-    return z * decay + speed * (1.0 - decay) / rate, rate
 
 
 @njit(cache=True)
@@ -173,6 +135,8 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     drive -= p.motor_weight * math.cos(m + p.motor_weight_phase)
     drive += p.drift * math.sin(2 * math.pi * t / 5.3) * math.exp(-t / 9.0)
     load = load_at(o, p)
+    load -= p.known_a * math.sin(2 * math.pi * p.known_a_hz * t)
+    load -= p.known_b * math.sin(2 * math.pi * p.known_b_hz * t + p.known_phase)
     load += p.load_coulomb * sign_of(wo, p.load_sign_speed, 1.0 - p.load_form) + p.load_viscous * wo
     dy[6], dy[7] = y[7], 0.0
     if p.absorber > 0:
@@ -192,36 +156,6 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     heat = friction * wm + p.damping * rate * rate
     dy[9] = (heat - (y[9] - 20.0) / p.thermal_resistance) / p.heat_capacity
     out[0], out[1] = tau, twist
-
-
-@njit(cache=True)
-def slider(k, p):
-    """Slip torque and slip twist of a slider: twelve that grow linearly, or three equal ones."""
-    if p.maxwell_form > 0:
-        if k > 2:
-            return 0.0, 1.0
-        return p.maxwell / 3.0, (1e-4, 3e-4, 8e-4)[k]
-    return p.maxwell * 2.0 * (k + 1) / (SLIDERS * (SLIDERS + 1)), p.maxwell_reach * (k + 1) / SLIDERS
-
-
-@njit(cache=True)
-def slip_slope(force, way, share, far, p):
-    """Stiffness of a slider that slips by and by: none at its slip torque, all of it on the way back."""
-    if force * way <= 0:
-        return share / far
-    return share / far * (1.0 - min(1.0, abs(force) / share) ** p.maxwell_power)
-
-
-@njit(cache=True)
-def slipped(force, way, share, far, p):
-    """Torque of a slider after a little more twist."""
-    if p.maxwell_power == 0 or share == 0:
-        return min(share, max(-share, force + share / far * way))
-    a = slip_slope(force, way, share, far, p)
-    b = slip_slope(force + 0.5 * way * a, way, share, far, p)
-    c = slip_slope(force + 0.5 * way * b, way, share, far, p)
-    d = slip_slope(force + way * c, way, share, far, p)
-    return force + way * (a + 2 * b + 2 * c + d) / 6.0
 
 
 @njit(cache=True)
@@ -297,38 +231,13 @@ def integrate(angle, speed, motion, start, p, table, reach, gains, log):
             t += h
 
 
-def spring_table(p: Numbers) -> tuple[np.ndarray, float]:
-    """Torque over twist of all compliances in series, and the twist at the table's end."""
-    top = 6.0 * p.t2
-    torque = np.concatenate([np.linspace(0.0, 0.05 * top, 20000), np.linspace(0.05 * top, top, 20000)[1:]])
-    d1, d2 = p.t1 / p.k1, p.t1 / p.k1 + (p.t2 - p.t1) / p.k2
-    far = d2 + (top - p.t2) / p.k3
-    twist = np.interp(torque, [0.0, p.t1, p.t2, top], [0.0, d1, d2, far])
-    if p.flexspline > 0:
-        scaled = p.flexspline_coefficient * torque
-        if p.flexspline_form > 0:
-            twist = twist + p.flexspline / p.flexspline_coefficient * np.arctan(scaled)
-        else:
-            twist = twist + p.flexspline * torque / np.sqrt(1.0 + scaled**2)
-    if p.generator > 0:
-        # At the wave generator the compliance is that at the output times the ratio squared.
-        scaled = p.generator_coefficient * torque / abs(p.ratio)
-        shape = -np.expm1(-scaled) if p.generator_form > 0 else scaled / (1.0 + scaled)
-        twist = twist + p.generator * abs(p.ratio) / p.generator_coefficient * shape
-    if p.mount > 0 and p.mount_inertia == 0:
-        twist = twist + (1.0 - 1.0 / p.ratio) ** 2 * p.mount * torque
-    reach = float(twist[-1])
-    half = np.interp(np.linspace(0.0, reach, TABLE // 2 + 1), twist, torque)
-    return np.concatenate([-half[:0:-1], half]), reach
-
-
 def balance(p: Numbers, angle: float, table: np.ndarray, reach: float) -> np.ndarray:
     """Output angle, housing angle and motor torque at rest under the load, where the log begins."""
     if p.locked:
         return np.zeros(3)
     motor, output, housing = p.ratio * angle, angle, 0.0
     for _ in range(30):
-        load = load_at(output, p)
+        load = load_at(output, p) - p.known_b * math.sin(p.known_phase)
         low, high = -reach, reach
         for _ in range(60):
             middle = 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""What the log of a plant reads: sensors, the log's rate, and what goes wrong with logs."""
+"""What the log of a plant reads: sensors, the log's rate, quantisation, a clock that jitters."""
 
 from __future__ import annotations
 
@@ -6,30 +6,63 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from contract import Measured
 from drives import LOCKED_SIGN_SPEED, SIGN_SPEED, Drive
 from motions import CONTROL_RATE, reference
 from plant_numbers import Numbers
 from plants import simulate
+from scipy.interpolate import CubicSpline
 
-CHANNELS = ("motor_angle", "motor_torque", "output_angle", "output_torque")
-DIRT = ("spikes", "gaps", "jitter", "missing stretches", "coarse clock", "saturated")
+#: Channels of each set of sensors. ``temperature`` may come on top.
+SENSORS = {
+    "motor": ("motor_angle", "motor_torque"),
+    "both": ("motor_angle", "motor_torque", "output_angle"),
+    "torque sensor": ("motor_angle", "motor_torque", "output_angle", "output_torque"),
+    "known load": ("motor_angle", "motor_torque", "output_angle", "load_torque"),
+}
+#: Parts of a sampling period by which jittering samples are late or early, at most.
+JITTER = 0.2
 
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything of an experiment but the plant's hidden effect."""
+    """Everything of one record but the plant's hidden effect.
+
+    Attributes:
+        drive: the nominal numbers, which are the base's.
+        motion: kind of motion, see ``motions.KINDS``.
+        gravity: whether the load is an arm.
+        rate: of the log, Hz; the plant's clock is a whole multiple of it.
+        seconds: length of the record.
+        seed: of motion and noise.
+        sensors: a key of ``SENSORS``.
+        temperature: whether that of the housing is measured.
+        noise: factor on the drive's angle noise; ``torque_noise`` on that of its torques.
+        step: of both encoders, over the standard deviation of the white noise before it.
+        torque_step: of the torques' converters, over that of theirs.
+        jitter: error of the stamps of samples that come late or early, as a share of by how much; 0: the
+            clock is even.
+        speed: factor on the motion's speed (on the twist, where the output is locked).
+        lacks: numbers of friction that neither base nor plant has.
+        algebraic_sign: friction changes sign by another formula than the model's.
+    """
 
     drive: Drive
     motion: str
     gravity: bool
-    rate: int
+    rate: float
     seconds: float
     seed: tuple[int, ...]
+    sensors: str = "torque sensor"
+    temperature: bool = False
     noise: float = 1.0
-    channels: tuple[str, ...] = CHANNELS
-    dirt: str = ""
+    torque_noise: float = 1.0
+    step: float = 0.3
+    torque_step: float = 0.3
+    jitter: float = 0.0
     speed: float = 1.0
     lacks: tuple[str, ...] = ()
+    algebraic_sign: bool = False
 
     @property
     def locked(self) -> bool:
@@ -37,26 +70,21 @@ class Setup:
         return self.motion == "locked"
 
     @property
-    def algebraic_sign(self) -> bool:
-        """Whether friction changes sign by another formula than the model's; only where noise hides that."""
-        return self.drive.algebraic_sign and not self.locked and self.noise >= 0.6
-
-    @property
-    def text(self) -> str:
-        """In words."""
-        load = "locked" if self.locked else "arm" if self.gravity else "inertia"
-        return f"{self.drive.name}, {self.motion}, {load}, {self.rate} Hz, {self.seconds:.0f} s"
+    def channels(self) -> tuple[str, ...]:
+        """Channels of the log."""
+        return (*SENSORS[self.sensors], *(["temperature"] if self.temperature else []))
 
     def noises(self) -> dict[str, float]:
         """Standard deviation of each channel's noise, with quantisation; of ``transmission`` the error's."""
         d = self.drive
-        motor = np.hypot(2e-5 * self.noise, 2 * np.pi / d.motor_counts / np.sqrt(12))
-        output = np.hypot(d.output_noise * self.noise, 2 * np.pi / d.output_counts / np.sqrt(12))
+        motor, output = d.motor_noise * self.noise, d.output_noise * self.noise
+        joint = d.output_torque_noise * self.torque_noise
         return {
-            "motor_angle": float(motor),
-            "motor_torque": d.motor_torque_noise * self.noise,
-            "output_angle": float(output),
-            "output_torque": d.output_torque_noise * self.noise,
+            "motor_angle": motor,
+            "motor_torque": d.motor_torque_noise * self.torque_noise,
+            "output_angle": output,
+            "output_torque": joint,
+            "load_torque": joint,
             "transmission": float(np.hypot(output, motor / d.ratio)),
             "temperature": 0.05,
         }
@@ -81,6 +109,11 @@ def numbers(setup: Setup, changes: dict[str, float]) -> Numbers:
         "sign_speed": LOCKED_SIGN_SPEED if setup.locked else SIGN_SPEED,
         "algebraic_sign": float(setup.algebraic_sign), "locked": float(setup.locked),
     }  # fmt: skip
+    if setup.sensors == "known load":
+        rng = np.random.default_rng([*setup.seed, 13])
+        size = d.torques[0] * rng.uniform(0.5, 1.5, 2)
+        nominal |= {"known_a": size[0], "known_a_hz": rng.uniform(0.15, 0.5), "known_b": 0.5 * size[1],
+                    "known_b_hz": rng.uniform(0.6, 2.0), "known_phase": rng.uniform(0, 6.283)}  # fmt: skip
     nominal |= dict.fromkeys(setup.lacks, 0.0)
     return Numbers(**{name: float(value) for name, value in (nominal | changes).items()})
 
@@ -88,14 +121,29 @@ def numbers(setup: Setup, changes: dict[str, float]) -> Numbers:
 @lru_cache(maxsize=8)
 def _reference(setup: Setup) -> tuple[np.ndarray, np.ndarray]:
     d = setup.drive
-    return reference(
-        setup.motion, replace(d, top_speed=d.top_speed * setup.speed), setup.seconds, [*setup.seed, 11]
-    )
+    # The log has to follow the motion: slow logs are taken of softer motions.
+    softest = 8.0 / setup.rate
+    if setup.locked:
+        return reference(setup.motion, d, setup.seconds, [*setup.seed, 11], setup.speed, softest)
+    fast = replace(d, top_speed=d.top_speed * setup.speed)
+    return reference(setup.motion, fast, setup.seconds, [*setup.seed, 11], 1.0, softest)
 
 
-def truth(setup: Setup, p: Numbers, like: np.ndarray | None = None) -> np.ndarray:
-    """What is true of an experiment (see ``simulate``); with the motor's motion ``like`` that of another."""
-    return simulate(p, *_reference(setup), None if like is None else like[:, [0, 5, 6]])
+def truth(
+    setup: Setup, p: Numbers, like: np.ndarray | None = None, seconds: float | None = None
+) -> np.ndarray:
+    """What is true of an experiment (see ``simulate``).
+
+    Args:
+        setup: the experiment.
+        p: the plant.
+        like: takes the motor's motion from this log instead of from the controller.
+        seconds: only the first of it.
+    """
+    angle, speed = _reference(setup)
+    n = len(angle) if seconds is None else min(len(angle), round(seconds * CONTROL_RATE))
+    n = n if like is None else min(n, len(like))
+    return simulate(p, angle[:n], speed[:n], None if like is None else like[:n, [0, 5, 6]])
 
 
 def readings(p: Numbers, log: np.ndarray) -> dict[str, np.ndarray]:
@@ -109,84 +157,50 @@ def readings(p: Numbers, log: np.ndarray) -> dict[str, np.ndarray]:
     joint = joint + p.sensor_ripple * (wave + p.sensor_second * np.sin(2 * p.sensor_order * motor + 0.6))
     # Current times the nominal torque constant: a saturating motor needs more current for its torque.
     torque = p.gain * torque * (1.0 + p.saturation * np.abs(torque) * abs(p.ratio) / p.t2)
+    load = p.known_a * np.sin(2 * np.pi * p.known_a_hz * time)
+    load += p.known_b * np.sin(2 * np.pi * p.known_b_hz * time + p.known_phase)
     return {
         "motor_angle": motor, "motor_torque": torque, "output_angle": output, "output_torque": joint,
-        "temperature": temperature, "transmission": output - motor / p.ratio,
+        "load_torque": load, "temperature": temperature, "transmission": output - motor / p.ratio,
     }  # fmt: skip
 
 
-@dataclass
-class Log:
-    """A measured log and what it would read without noise; both by channel."""
+def sampled(setup: Setup, log: np.ndarray) -> np.ndarray:
+    """The motor's motion as the log's samples tell it, a cubic: shape (n, 7), see ``simulate``."""
+    step = round(CONTROL_RATE / setup.rate)
+    ticks = np.arange(len(log))
+    spline = CubicSpline(ticks[::step] / CONTROL_RATE, log[::step, 0])
+    found = np.zeros_like(log)
+    for column, order in ((0, 0), (5, 1), (6, 2)):
+        found[:, column] = spline(ticks / CONTROL_RATE, order)
+    # Beyond the last sample nothing is known.
+    return found[: step * ((len(log) - 1) // step)]
 
-    time: np.ndarray
-    channels: dict[str, np.ndarray]
-    ideal: dict[str, np.ndarray]
-    spoilt: np.ndarray  # samples that dirt has touched
 
-
-def measure(setup: Setup, p: Numbers) -> Log:
-    """Sample, add noise, quantise, and soil the readings of a plant."""
+def measure(setup: Setup, p: Numbers, name: str) -> Measured:
+    """Sample the readings of a plant, add noise, quantise."""
     rng = np.random.default_rng([*setup.seed, 7])
-    step = CONTROL_RATE // setup.rate
-    ideal = {name: values[::step] for name, values in readings(p, truth(setup, p)).items()}
-    n, d, noises = len(ideal["motor_angle"]), setup.drive, setup.noises()
+    step = round(CONTROL_RATE / setup.rate)
+    whole = readings(p, truth(setup, p))
+    ideal = {channel: whole[channel][::step] for channel in setup.channels}
+    n, noises = len(ideal["motor_angle"]), setup.noises()
     time = np.arange(n) / setup.rate
-    if setup.dirt == "jitter":
-        # The samples are taken late or early, the stamps tell when, to a tenth.
-        shift = rng.uniform(-0.2, 0.2, n) / setup.rate
-        ideal = {name: np.interp(time + shift, time, values) for name, values in ideal.items()}
-        time = time + shift * rng.uniform(0.9, 1.1, n)
-    clean = {}
-    for name in (*setup.channels,):
-        clean[name] = ideal[name] + 0.0
+    if setup.jitter:
+        # The samples are taken late or early; the stamps tell when, but for a share.
+        shift = rng.uniform(-JITTER, JITTER, n) / setup.rate
+        clock = np.arange(len(whole["motor_angle"])) / CONTROL_RATE
+        ideal = {channel: np.interp(time + shift, clock, whole[channel]) for channel in ideal}
+        time = time + shift * (1.0 + setup.jitter * rng.uniform(-1.0, 1.0, n))
     channels = {}
-    for name, values in clean.items():
-        white = rng.standard_normal(n)
-        if name in ("motor_angle", "output_angle"):
-            spread = 2e-5 if name == "motor_angle" else d.output_noise
-            counts = d.motor_counts if name == "motor_angle" else d.output_counts
-            channels[name] = _stepped(values + spread * setup.noise * white, 2 * np.pi / counts)
-        else:
-            offset = rng.uniform(-1.5, 1.5) * noises[name]
-            channels[name] = _stepped(values + offset + noises[name] * white, 0.3 * noises[name])
-    time, channels, spoilt, keep = _soiled(setup, rng, time, channels)
-    return Log(time - time[0], channels, {c: v[keep] for c, v in clean.items()}, spoilt)
-
-
-def _soiled(
-    setup: Setup, rng: np.random.Generator, time: np.ndarray, channels: dict[str, np.ndarray]
-) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    n = len(time)
-    spoilt, keep = np.zeros(n, bool), np.ones(n, bool)
-    torques = [c for c in ("motor_torque", "output_torque") if c in channels]
-    if setup.dirt == "spikes":
-        for name in channels:
-            where = rng.choice(n, 12, replace=False)
-            size = np.ptp(channels[name]) * (1.0 if name in torques else 0.05)
-            channels[name][where] += rng.choice([-1.0, 1.0], 12) * rng.uniform(0.7, 1.5, 12) * size
-            spoilt[where] = True
-    elif setup.dirt == "gaps":
-        for _ in range(3):
-            start = rng.integers(n // 10, n - n // 10)
-            keep[start : start + round(rng.uniform(0.03, 0.25) * setup.rate)] = False
-    elif setup.dirt == "missing stretches":
-        for name in channels:
-            start = rng.integers(n // 10, n - n // 10)
-            length = round(rng.uniform(0.02, 0.06 if name.endswith("angle") else 0.3) * setup.rate)
-            channels[name][start : start + length] = np.nan
-            spoilt[start : start + length] = True
-    elif setup.dirt == "coarse clock":
-        # The clock ticks every 2.5 samples, so stamps come twice or three times.
-        tick = 2.5 / setup.rate
-        time = np.floor(time / tick + 1e-9) * tick
-    elif setup.dirt == "saturated":
-        values = channels["motor_torque"]
-        top = np.quantile(np.abs(values), 0.985)
-        spoilt |= np.abs(values) >= top
-        channels["motor_torque"] = np.clip(values, -top, top)
-    return time[keep], {c: v[keep] for c, v in channels.items()}, spoilt[keep], keep
-
-
-def _stepped(values: np.ndarray, step: float) -> np.ndarray:
-    return np.round(values / step) * step
+    for channel, values in ideal.items():
+        steps = setup.step if channel.endswith("angle") else setup.torque_step
+        # White noise and rounding together are the channel's noise.
+        white = noises[channel] / np.hypot(1.0, steps / np.sqrt(12))
+        offset = 0.0 if channel.endswith("angle") else rng.uniform(-1.5, 1.5) * noises[channel]
+        if channel == "temperature":
+            white, offset, steps = 0.05, 0.0, 2.0
+        if channel == "load_torque":
+            offset = 0.0
+        noisy = values + offset + white * rng.standard_normal(n)
+        channels[channel] = np.round(noisy / (steps * white)) * (steps * white)
+    return Measured(name, time - time[0], channels, {c: v.copy() for c, v in ideal.items()})

@@ -7,7 +7,7 @@ Much of a trace can look like a wrong number of the base model (a compliance lik
 on the load like more friction on the motor), and no tool can or should tell that from the wrong number. So
 the strength that counts is taken after least squares have removed an offset of each channel and the plant's
 sensitivities to its own inertias, stiffness, damping, friction, weight and torque constant, all channels
-together, weighed by their noise.
+together, weighed by their noise. It is that of the first `WINDOW_S` of the first record.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ from functools import lru_cache
 import numpy as np
 from motions import CONTROL_RATE
 from plant_numbers import Numbers
-from sensing import Setup, numbers, readings, truth
+from sensing import Setup, numbers, readings, sampled, truth
 
-#: Every fourth reading of the controller's clock enters; the first tenth of a second doesn't.
-EVERY = 4
+#: What of a record is looked at, s.
+WINDOW_S = 12.0
+#: Every twentieth reading of the controller's clock enters; the first tenth of a second doesn't.
+EVERY = 20
 SKIP = CONTROL_RATE // 10
 #: The base model's own numbers; those that scale together are one.
 OWN = (
@@ -46,11 +48,11 @@ def weighed(setup: Setup, p: Numbers, log: np.ndarray) -> np.ndarray:
     return np.array([found[c][SKIP::EVERY] / noises[c] for c in setup.compared()])
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _explained(setup: Setup) -> np.ndarray:
     """An orthonormal basis of what offsets and the base's numbers can explain, shape (channels * n, k)."""
     base = numbers(setup, {})
-    log = truth(setup, base)
+    log = truth(setup, base, seconds=WINDOW_S)
     plain = weighed(setup, base, log)
     columns = []
     for names in OWN:
@@ -68,7 +70,7 @@ def _explained(setup: Setup) -> np.ndarray:
 def _trace(setup: Setup, changes: dict[str, float]) -> np.ndarray:
     """Trace of changes over the noise, less its mean, shape (channels, n)."""
     p, base = numbers(setup, changes), numbers(setup, {})
-    log = truth(setup, p)
+    log = truth(setup, p, seconds=WINDOW_S)
     trace = weighed(setup, p, log) - weighed(setup, base, truth(setup, base, log))
     return trace - trace.mean(axis=1, keepdims=True)
 
@@ -90,3 +92,18 @@ def strength(setup: Setup, changes: dict[str, float]) -> Strength:
     return Strength(
         float(np.sqrt(np.mean(centred**2, axis=1)).max()), float(beyond[best]), setup.compared()[best]
     )
+
+
+def unresolved(setup: Setup, changes: dict[str, float]) -> float:
+    """How much of a record its samples cannot carry: the largest root-mean-square over the noise.
+
+    The same plant is moved as a cubic through the samples of the motor's angle says (without noise). Where
+    that reads otherwise than the plant itself, the log is too slow for the motion, and no model could
+    explain it. The ends, where a cubic has nothing to hold on to, are left out.
+    """
+    p = numbers(setup, changes)
+    log = truth(setup, p, seconds=WINDOW_S)
+    like = sampled(setup, log)
+    rest = weighed(setup, p, log[: len(like)]) - weighed(setup, p, truth(setup, p, like))
+    rest = rest[:, : -2 * SKIP // EVERY]
+    return float(np.sqrt(np.mean((rest - rest.mean(axis=1, keepdims=True)) ** 2, axis=1)).max())

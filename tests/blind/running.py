@@ -1,0 +1,172 @@
+"""Draw blind cases, hand log and base to the diagnosis, and store what it says: one JSON line a case."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import importlib
+import json
+import multiprocessing
+import os
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from contract import AbsentError, Case, Measured
+from judging import Line, closed, covered
+
+import hdsim
+from hdsim.diagnose.workflow import diagnose
+from hdsim.estimate.records import Record
+from hdsim.scenario import Scenario
+
+FAMILIES = ("numpy", "mujoco", "toothed", "real")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A case before it is drawn."""
+
+    family: str
+    number: int
+    seed: int
+
+
+def task_of(key: str) -> Task:
+    """The task of a key ``family/kind/truth/number/seed``."""
+    family, *_, number, seed = key.split("/")
+    return Task(family, int(number), int(seed))
+
+
+def family(name: str) -> ModuleType:
+    """The module of a family.
+
+    Raises:
+        AbsentError: what it needs is not here.
+    """
+    try:
+        return importlib.import_module(f"family_{name}")
+    except ModuleNotFoundError as error:
+        raise AbsentError(f"family {name}: {error}") from None
+
+
+def base_of(case: Case) -> Scenario:
+    """The base model, from its YAML text."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "base.yaml"
+        path.write_text(case.base, encoding="utf-8")
+        return hdsim.load_scenario(path)
+
+
+def record_of(measured: Measured) -> Record:
+    """A record as the diagnosis takes it; nothing that an ideal sensor would read goes along."""
+    return Record(measured.name, measured.time.copy(), {c: v.copy() for c, v in measured.channels.items()})
+
+
+def attempt(task: Task) -> Line:
+    """Draw a case and diagnose it: everything that the page needs, as JSON.
+
+    Raises:
+        AbsentError: what the family needs is not here.
+    """
+    started = time.process_time()
+    line: Line = {"key": "", "family": task.family, "number": task.number, "seed": task.seed, "kind": "",
+                  "truth": [], "strength": [], "setup": {}, "verdict": None, "error": None}  # fmt: skip
+    try:
+        case = family(task.family).draw(task.number, task.seed)
+    except AbsentError:
+        raise
+    except Exception as error:
+        line["key"] = f"{task.family}/not drawn/-/{task.number}/{task.seed}"
+        return line | {"error": f"not drawn: {_words(error)}"}
+    line |= {
+        "key": case.key, "kind": case.kind, "truth": [sorted(t) for t in case.truth],
+        "strength": [float(s) for s in case.strength], "setup": case.setup,
+        "made_cpu_s": round(time.process_time() - started, 2),
+    }  # fmt: skip
+    return line | _diagnosed(case)
+
+
+def _diagnosed(case: Case) -> Line:
+    started, began = time.process_time(), time.perf_counter()
+    found: Line = {}
+    try:
+        diagnosis = diagnose(
+            [record_of(r) for r in case.records],
+            base_of(case),
+            holdout=[record_of(r) for r in case.holdout],
+            load=case.load,
+        )
+    except Exception as error:
+        # A diagnosis that stops is a wrong answer, whatever stops it.
+        found["error"] = _words(error)
+    # All threads of this process count.
+    found |= {"cpu_s": round(time.process_time() - started, 2), "s": round(time.perf_counter() - began, 2)}
+    if "error" in found:
+        return found
+    verdict = diagnosis.verdict.model_dump(mode="json")
+    if verdict.get("curve"):
+        verdict["curve"] = {k: v for k, v in verdict["curve"].items() if not isinstance(v, (list, dict))}
+    found |= {
+        "verdict": verdict,
+        "seconds": verdict["seconds"],
+        "closed": closed(case, verdict["gap"]),
+        "numbers": covered(case, verdict),
+        "expected": case.numbers,
+    }
+    evidence = getattr(diagnosis, "evidence", None)
+    if evidence is not None:
+        found["evidence"] = evidence.model_dump(mode="json")
+    return found
+
+
+def _words(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".splitlines()[0][:300]
+
+
+def lines_of(paths: Sequence[Path]) -> list[Line]:
+    """Stored lines, the last of each case; one that was cut off is left out."""
+    found: dict[Task, Line] = {}
+    for path in paths:
+        for text in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+            try:
+                line = json.loads(text)
+            except json.JSONDecodeError:
+                continue
+            found[Task(line["family"], line["number"], line["seed"])] = line
+    return list(found.values())
+
+
+def run(todo: Sequence[Task], jobs: int) -> Iterator[Line | AbsentError]:
+    """Lines as they come."""
+    if jobs == 1:
+        for task in todo:
+            try:
+                yield attempt(task)
+            except AbsentError as missing:
+                yield missing
+        return
+    # One thread a process: the processes are what runs side by side.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    context = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        for future in concurrent.futures.as_completed([pool.submit(attempt, task) for task in todo]):
+            try:
+                yield future.result()
+            except AbsentError as missing:
+                yield missing
+
+
+def stored(line: Line) -> str:
+    """A line as it is written."""
+    return json.dumps(line, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (set, frozenset)):
+        return sorted(value)
+    return value.tolist() if hasattr(value, "tolist") else float(value)
