@@ -16,7 +16,7 @@ help:
 	@echo "make setup      only install what is needed into $(VENV)"
 	@echo "make lock       resolve the development set anew (needs uv)"
 	@echo "make schema     write scenarios/scenario.schema.json anew"
-	@echo "make blind      hide effects in data and see what the diagnosis makes of them (an hour or two; goes on where it stopped)"
+	@echo "make blind      hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
 	@echo "make picture    draw docs/images/seed_move.png anew"
 	@echo "make clean      remove $(VENV), caches and logs"
 
@@ -52,8 +52,9 @@ schema: $(STAMP)
 	$(BIN)/hdsim schema -o scenarios/scenario.schema.json
 
 blind: $(STAMP)
-	mkdir -p results
-	$(BIN)/python tests/blind --jobs $(WORKERS) --results results/blind.jsonl --write docs/blind.md
+	$(BIN)/python tests/blind run --families numpy,mujoco,toothed,real --numbers 0-99 --seed 1 --jobs $(WORKERS) \
+	  --results results/blind.jsonl
+	$(BIN)/python tests/blind page --results results/blind.jsonl --write docs/blind.md
 
 picture: run
 	cp logs/seed_move.png docs/images/seed_move.png

@@ -91,6 +91,7 @@ def page(given: argparse.Namespace) -> None:
     import page as pages
 
     lines = lines_of(given.results)
+    given.write.parent.mkdir(parents=True, exist_ok=True)
     given.write.write_text(pages.page(lines), encoding="utf-8")
     pages.reliability_picture(lines, given.write.parent / "images" / "reliability.png")
     print(f"{len(lines)} cases: {given.write}")

@@ -39,7 +39,8 @@ LEAST_NOISE = 0.1
 TRIES, NEAR, TOLERANCE = 14, 0.3, 0.1
 #: Part of the noise, or of the strength, that a log may lose between its samples.
 LOST, LOST_OF_STRENGTH = 0.3, 0.1
-#: Friction of another formula than the base's needs this much noise to hide in.
+#: Friction of another formula than the base's needs this much noise to hide in; where nothing is hidden, and
+#: where no name is right, it would be something to find.
 HIDES_SIGN = 0.6
 
 #: The base's numbers: names in the plant, path in the scenario.
@@ -219,7 +220,11 @@ def _setups(
         speed=_speed(wanted, motion, rng),
         lacks=tuple(name for h in hidden for name in h.lacks),
         algebraic_sign=bool(
-            not wanted.same and motion != "locked" and torque_noise >= HIDES_SIGN and rng.random() < 0.5
+            wanted.kind in ("effect", "pair")
+            and not wanted.same
+            and motion != "locked"
+            and torque_noise >= HIDES_SIGN
+            and rng.random() < 0.5
         ),
     )
 

@@ -148,3 +148,11 @@ def _same_order(path: str, expected: dict[str, float], given: dict[str, Any]) ->
         if other.endswith(".order") and abs(given[other]["value"] - order) < 0.01 * order:
             return f"{other.removesuffix('.order')}.{last}"
     return path
+
+
+def borne_out(line: Line) -> bool:
+    """Whether what the stated confidence is about is true: the first name, or the verdict without one."""
+    names = groups(line)
+    if not names:
+        return outcome(line) == "right"
+    return any(_holds(names[0], set(wanted)) for wanted in line["truth"])

@@ -1,16 +1,17 @@
 """The plants themselves: conservation laws, statics, agreement with the model that is to fit them."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from cases import Case, Trial, case_of, trials
-from drives import DRIVES
+from drives import DRIVES, around, base_yaml
 from hidden import EFFECTS
-from judging import base_of, judge
 from motions import CONTROL_RATE
-from plants import spring_table
-from sensing import CHANNELS, Setup, measure, numbers, readings, truth
-from strength import strength
+from plant_springs import spring_table
+from sensing import SENSORS, Setup, measure, numbers, readings, truth
+from strength import strength, unresolved
 
+import hdsim
 from hdsim.effects import catalogue
 from hdsim.estimate.freedom import put, state_of
 from hdsim.estimate.predict import Candidate, predictors
@@ -25,13 +26,19 @@ def setup_of(k: int, **changes) -> Setup:
     return Setup(**(given | changes))
 
 
-def compared(setup: Setup, changes: dict[str, float], effects=None) -> dict[str, float]:
+@pytest.fixture
+def compared(tmp_path):
     """RMS difference of the plant and hdsim's prediction over the noise, by channel."""
+    return lambda *given: _compared(tmp_path / "base.yaml", *given)
+
+
+def _compared(path: Path, setup: Setup, changes: dict[str, float], effects=None) -> dict[str, float]:
     p = numbers(setup, changes)
-    ideal = {name: v[:: CONTROL_RATE // setup.rate] for name, v in readings(p, truth(setup, p)).items()}
+    ideal = {name: v[:: round(CONTROL_RATE / setup.rate)] for name, v in readings(p, truth(setup, p)).items()}
     time = np.arange(len(ideal["motor_angle"])) / setup.rate
-    record = Record("blind", time, {c: ideal[c] for c in CHANNELS})
-    scenario = base_of(Case(Trial("null", "nothing", 0), setup, {}))
+    record = Record("blind", time, {c: ideal[c] for c in setup.channels})
+    path.write_text(base_yaml(setup.drive, gravity=setup.gravity, locked=setup.locked, lacks=setup.lacks))
+    scenario = hdsim.load_scenario(path)
     predictor = predictors([record], scenario.drive.ratio, locked="output" if setup.locked else "")[0]
     model = state_of(scenario).candidate()
     found = predictor.predict(Candidate(model.drive, effects or {}, model.load))
@@ -40,14 +47,50 @@ def compared(setup: Setup, changes: dict[str, float], effects=None) -> dict[str,
     return {c: float(np.std(values) / noises[c]) for c, values in rest.items()}
 
 
+@pytest.mark.parametrize("algebraic", [False, True])
 @pytest.mark.parametrize("k", range(len(DRIVES)))
-def test_a_plant_without_an_effect_is_the_base_model(k):
+def test_a_plant_without_an_effect_is_the_base_model(k, algebraic, compared):
     """A base YAML and a plant that disagree would make every answer wrong, and every null a lie."""
-    rest = compared(setup_of(k), {})
-    # Two of the drives smooth the sign of their friction by another formula than the model.
-    assert rest.pop("motor_torque") < (0.25 if DRIVES[k].algebraic_sign else 0.12)
+    setup = setup_of(k, algebraic_sign=algebraic and MOTIONS[k] != "locked")
+    rest = compared(setup, {})
+    # Where friction changes sign by another formula than the model's, that hides in the noise.
+    assert rest.pop("motor_torque") < (0.3 if setup.algebraic_sign else 0.15)
     # Where a locked drive is unwound is estimated from its log, which shifts its torque a little.
-    assert max(rest.values()) < (0.4 if setup_of(k).locked else 0.03)
+    assert max(rest.values()) < (0.4 if setup.locked else 0.03)
+
+
+@pytest.mark.parametrize("sensors", SENSORS)
+def test_sensors_read_the_plant_with_the_noise_that_they_are_said_to_have(sensors, compared):
+    drive = around(DRIVES[1], (0.1, 0.9, 0.3, 0.5, 0.7, 0.2, 0.8, 0.6))
+    setup = setup_of(1, drive=drive, motion="swing", sensors=sensors, rate=1000, step=6.0, noise=0.7)
+    assert max(compared(setup, {}).values()) < 0.2
+    log = measure(setup, numbers(setup, {}), "a")
+    assert set(log.channels) == set(SENSORS[sensors]) == set(log.ideal)
+    noises = setup.noises()
+    for channel, values in log.channels.items():
+        assert np.std(values - log.ideal[channel]) == pytest.approx(noises[channel], rel=0.1), channel
+    steps = np.unique(np.abs(np.diff(log.channels["motor_angle"])))
+    step = steps[steps > 1e-12].min()
+    assert step == pytest.approx(6.0 * noises["motor_angle"] / np.hypot(1.0, 6.0 / np.sqrt(12)), rel=1e-6)
+
+
+def test_a_known_load_moves_the_output_as_statics_say():
+    """A motor that stands still: the spring's twist is that of the known torque and the arm's weight."""
+    setup = setup_of(4, motion="swing", sensors="known load", gravity=False, seconds=8.0, speed=1e-6)
+    p = numbers(setup, {})._replace(load_inertia=1e-3, k1=1e5, k2=1e5, k3=1e5)
+    log = truth(setup, p)
+    read = readings(p, log)
+    twist = read["motor_angle"] / p.ratio - read["output_angle"]
+    assert np.ptp(read["load_torque"]) > 10
+    # The load turns the output on, against the spring: the spring carries minus the load.
+    assert np.abs(twist * 1e5 + read["load_torque"])[2000:].max() < 0.02 * np.ptp(read["load_torque"])
+
+
+def test_a_log_that_is_too_slow_for_its_motion_is_told_from_one_that_is_not():
+    ripple = {"ripple_a": 0.05, "ripple_a_order": 12.0}
+    fast, slow = (setup_of(0, rate=rate, motion="swing") for rate in (2000, 100))
+    assert unresolved(fast, ripple) < 0.2
+    assert unresolved(slow, {}) < 0.3 < 1.0 < unresolved(slow, ripple)
 
 
 def test_a_plant_without_losses_conserves_energy():
@@ -128,11 +171,11 @@ OWN_NAME = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", EFFECTS, ids=lambda hidden: hidden.name)
-def test_the_numbers_to_recover_are_those_of_the_plant(hidden):
+def test_the_numbers_to_recover_are_those_of_the_plant(hidden, compared):
     """Put into the catalogue's effect, the numbers that count as the truth reproduce the plant's trace."""
     k = 4 if "locked" not in hidden.motions else 1
     setup = setup_of(
-        k, motion="moves", lacks=hidden.lacks, seconds=6.0, speed=hidden.speed, noise=0.5, rate=2000
+        k, motion="moves", lacks=hidden.lacks, speed=hidden.speed, noise=0.5, torque_noise=0.5, rate=2000
     )
     changes = hidden.build(setup.drive, np.full(6, 0.3), 2.0 * hidden.start, True)
     name, label = OWN_NAME.get(hidden.name, (hidden.name, ""))
@@ -142,44 +185,3 @@ def test_the_numbers_to_recover_are_those_of_the_plant(hidden):
     rest = compared(setup, changes, {name: effect})
     assert trace.plain > 0.1
     assert max(rest.values()) < max(0.05 * trace.plain, 0.1), (rest, trace)
-
-
-def test_a_case_follows_from_its_key_and_has_its_strength():
-    trial = Trial("fair", "stribeck_friction", 1, ("stribeck_friction",))
-    first, again = case_of(trial), case_of(trial)
-    assert first == again
-    assert first.strengths[0].beyond_base == pytest.approx(2.0, rel=0.2)
-    assert first.strengths[0].plain >= first.strengths[0].beyond_base
-    logs = [measure(c.setup, numbers(c.setup, c.changes)) for c in (first, again)]
-    assert all(np.array_equal(logs[0].channels[c], logs[1].channels[c]) for c in logs[0].channels)
-    other = case_of(Trial("fair", "stribeck_friction", 2, ("stribeck_friction",)))
-    assert other.setup != first.setup
-
-
-def test_the_matrix_is_as_wide_as_it_says():
-    found = list(trials(range(100, 103)))
-    assert len({t.key for t in found}) == len(found) >= 300
-    count = {g: sum(t.group == g for t in found) for g in {t.group for t in found}}
-    quiet = sum(not t.effects for t in found)
-    assert quiet >= 100
-    least = {"clear": 60, "fair": 50, "faint": 40, "pair": 20, "outside": 25, "missing": 20, "dirty": 15}
-    assert all(count[group] >= number for group, number in least.items()), count
-    named = {name for effect in EFFECTS for name in (effect.accepted or (effect.name,))}
-    assert named >= {name for name, effect in catalogue().items() if effect.fittings}
-
-
-def test_judging():
-    clear = Trial("clear", "stribeck_friction", 0, ("stribeck_friction",))
-    faint = Trial("faint", "stribeck_friction", 0, ("stribeck_friction",))
-    pair = Trial("pair", "", 0, ("stribeck_friction", "kinematic_error"))
-    assert judge(clear, "effect", [["lugre_friction", "stribeck_friction"], ["unbalance"]])
-    assert not judge(clear, "effect", [["unbalance"], ["stribeck_friction"]])
-    assert not judge(clear, "effect", [["a", "b", "c", "stribeck_friction"]])
-    assert not judge(clear, "unknown", [])
-    assert judge(faint, "nothing", [])
-    assert not judge(faint, "effect", [["unbalance"]])
-    assert judge(pair, "effect", [["kinematic_error"], ["stribeck_friction"]])
-    assert not judge(pair, "effect", [["kinematic_error"]])
-    assert judge(Trial("outside", "cable", 0, ("cable",)), "unknown", [])
-    assert not judge(Trial("null", "nothing", 0), "unknown", [])
-    assert not judge(Trial("parameter", "mass", 0, parameters=("mass",)), "nothing", [])

@@ -1,26 +1,30 @@
-"""A sample of the blind matrix; ``make blind`` runs the whole and writes docs/blind.md."""
+"""A few drawn cases from end to end; ``make blind`` runs hundreds and writes docs/blind.md."""
+
+import json
 
 import pytest
-from cases import trials
-from judging import attempt
+from judging import OUTCOMES, outcome
+from running import attempt, stored, task_of
 
-#: Short records of several drives, one or more of each kind of answer.
+#: Short logs of every kind.
 SAMPLE = (
-    "null/nothing#4/0",
-    "parameter/load-dependent loss/0",
-    "clear/output encoder delay/0",
-    "clear/unbalance/0",
-    "missing/load_side_friction, no motor angle/0",
-    "pair/unbalance + input_coulomb_viscous/0",
-    "outside/drifting torque/0",
-    # A name that fits well and makes held-out data worse.
-    "outside/cable/600",
+    "numpy/parameter/-/3/0",
+    "numpy/effect/-/4/0",
+    "numpy/null/-/7/0",
 )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", SAMPLE)
 def test_blind(key):
-    trial = next(t for t in trials([int(key.rpartition("/")[2])]) if t.key == key)
-    result = attempt(trial)
-    assert result["right"], result
+    line = json.loads(stored(attempt(task_of(key))))
+    assert line["error"] is None
+    assert line["key"].split("/")[1] == line["kind"] == key.split("/")[1]
+    assert outcome(line) in OUTCOMES
+    assert line["verdict"]["gap"]
+    assert line["cpu_s"] > 0
+    assert sum(line["seconds"].values()) <= line["s"] + 1.0
+    assert {"sensors", "rate_hz", "held", "formula", "records", "seconds"} <= set(line["setup"])
+    assert all(len(row) == 6 and row[3] <= row[4] for row in line["numbers"])
+    # What ideal sensors read stays with the judge.
+    assert "ideal" not in line["verdict"]

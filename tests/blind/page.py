@@ -1,0 +1,310 @@
+"""The blind page: rates with intervals by family, strength, sensors, kind of held-out data; every failure."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from judging import OUTCOMES, Line, false_alarm, false_name, outcome, said
+from page_text import HEAD, limits
+from reliability import binned, calibration_error
+from reliability import picture as reliability_picture
+from scipy.stats import binomtest
+
+__all__ = ["page", "reliability_picture"]
+
+#: Bands of strength: they meet at the middle, in logarithm, between the strengths that are asked for.
+BANDS = ((0.5, 1.5), (1.5, 3.5), (3.5, 10.0), (10.0, 35.0), (35.0, 100.0))
+#: Of what can be closed of the held-out gap, the share that is asked for; of cases as strong as this.
+CLOSED, CLEAR = 0.9, 3.5
+LEFT_OUT = "mujoco"
+
+
+def rate(right: int, count: int) -> str:
+    """A rate with its Clopper-Pearson 95 % interval, in words."""
+    if count == 0:
+        return "-"
+    bounds = binomtest(right, count).proportion_ci(0.95, "exact")
+    return f"{100 * right / count:.0f} % ({100 * bounds.low:.0f} to {100 * bounds.high:.0f})"
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
+    """A Markdown table."""
+    if not rows:
+        return ["None."]
+    cells = [[str(cell).replace("|", "/").replace("\n", " ") for cell in row] for row in rows]
+    lines = [" | ".join(row) for row in ([*heads], ["---"] * len(heads), *cells)]
+    return [f"| {line} |" for line in lines]
+
+
+def states(line: Line) -> bool:
+    """Whether a case may be stated: no rule was calibrated on it."""
+    return line["family"] == LEFT_OUT or line["seed"] % 2 == 1
+
+
+def band(line: Line) -> str:
+    """Band of the strength of what is hidden least visibly."""
+    if not line["strength"]:
+        return "-"
+    weakest = min(line["strength"])
+    for low, high in BANDS:
+        # What was not quite reached, or passed, belongs to the end bands.
+        if weakest < high or high == BANDS[-1][1]:
+            return f"{low:g} to {high:g}"
+    raise AssertionError
+
+
+def page(lines: Sequence[Line]) -> str:
+    """The whole page."""
+    lines = sorted(lines, key=lambda r: (r["family"], r["seed"], r["number"]))
+    drawn = [r for r in lines if not str(r["error"] or "").startswith("not drawn")]
+    stated = [r for r in drawn if states(r)]
+    others = [r for r in drawn if not states(r)]
+    text = [HEAD, _counts(lines, drawn), ""]
+    text += [*_asked(stated, others), "", *_confidence(stated), ""]
+    for title, of in DIMENSIONS.items():
+        text += [*_by(title, of, stated), ""]
+    text += [*_bands_of_families(stated), "", *_time(stated), "", *_confusion(stated), ""]
+    text += [*_failures(stated), "", *_outside_intervals(stated), "", *limits(), ""]
+    return "\n".join(text)
+
+
+def _counts(lines: Sequence[Line], drawn: Sequence[Line]) -> str:
+    words = []
+    for name in dict.fromkeys(r["family"] for r in lines):
+        own = [r for r in lines if r["family"] == name]
+        seeds = ", ".join(str(s) for s in sorted({r["seed"] for r in own}))
+        words.append(f"`{name}` {len(own)} (seeds {seeds})")
+    lost = len(lines) - len(drawn)
+    return f"{len(drawn)} cases: {'; '.join(words)}." + (f" {lost} could not be drawn." if lost else "")
+
+
+#: What cases are told apart by.
+DIMENSIONS: dict[str, Callable[[Line], str]] = {
+    "family": lambda r: r["family"],
+    "strength": band,
+    "sensors": lambda r: str(r["setup"].get("sensors", "-")),
+    "held out": lambda r: str(r["setup"].get("held", "-")),
+    "formula": lambda r: str(r["setup"].get("formula", "-")),
+    "encoder step": lambda r: _step(r["setup"].get("encoder_step_over_noise")),
+    "sample rate": lambda r: _rate_band(r["setup"].get("rate_hz")),
+}
+
+
+def _step(step: float | None) -> str:
+    if step is None:
+        return "-"
+    return (
+        "below the noise" if step < 1 else "1 to 3 times the noise" if step < 3 else "3 to 10 times the noise"
+    )
+
+
+def _rate_band(hz: float | None) -> str:
+    if hz is None:
+        return "-"
+    return "100 to 350 Hz" if hz < 350 else "350 to 1500 Hz" if hz < 1500 else "1500 to 5000 Hz"
+
+
+def _measures(lines: Sequence[Line]) -> dict[str, tuple[int, int]]:
+    """Numbers of right ones and of cases, by what is asked."""
+    effects = [r for r in lines if r["kind"] == "effect"]
+    quiet = [r for r in lines if r["kind"] in ("null", "parameter")]
+    hidden = [r for r in lines if r["kind"] in ("effect", "pair")]
+
+    def share(own: Sequence[Line], test: Callable[[Line], bool]) -> tuple[int, int]:
+        return sum(test(r) for r in own), len(own)
+
+    def right(r: Line) -> bool:
+        return outcome(r) == "right"
+
+    found = {
+        f"first name right, strength {low:g} to {high:g}": share(
+            [r for r in effects if band(r) == f"{low:g} to {high:g}"], right
+        )
+        for low, high in BANDS
+    }
+    found["wrong first name where an effect is hidden"] = share(hidden, false_name)
+    found["false alarm where nothing is hidden or a number is off"] = share(quiet, false_alarm)
+    found["a number that is off said to be"] = share([r for r in lines if r["kind"] == "parameter"], right)
+    found["`unknown`, outside the catalogue"] = share([r for r in lines if r["kind"] == "outside"], right)
+    found["a name, outside the catalogue"] = share(
+        [r for r in lines if r["kind"] == "outside"], lambda r: outcome(r) == "wrong name"
+    )
+    found["both of a pair"] = share([r for r in lines if r["kind"] == "pair"], right)
+    closable = [r for r in hidden if r.get("closed") is not None and min(r["strength"]) >= CLEAR]
+    found["nine tenths of the closable held-out gap closed, strength from 3.5"] = share(
+        closable, lambda r: r["closed"] >= CLOSED
+    )
+    numbers = [row for r in lines for row in r.get("numbers", [])]
+    found["true number in its 95 % interval"] = (sum(row[5] for row in numbers), len(numbers))
+    found["stopped with an error"] = share(lines, lambda r: outcome(r) == "error")
+    return found
+
+
+ASKED = {
+    "first name right, strength 1.5 to 3.5": ">= 85 % (at 2)",
+    "first name right, strength 3.5 to 10": ">= 95 % (at 5)",
+    "first name right, strength 35 to 100": ">= 95 % (at 50)",
+    "wrong first name where an effect is hidden": "<= 3 %",
+    "false alarm where nothing is hidden or a number is off": "<= 3 %",
+    "`unknown`, outside the catalogue": ">= 85 %",
+    "both of a pair": ">= 85 %",
+    "nine tenths of the closable held-out gap closed, strength from 3.5": ">= 90 %",
+    "true number in its 95 % interval": "90 to 98 %",
+}
+
+
+def _asked(stated: Sequence[Line], others: Sequence[Line]) -> list[str]:
+    there = _measures(others)
+    rows: list[list[Any]] = [
+        [what, count, rate(right, count), ASKED.get(what, ""), there[what][1], rate(*there[what])]
+        for what, (right, count) in _measures(stated).items()
+    ]
+    row: list[Any] = ["processor seconds: median / nine tenths / longest"]
+    for own in (stated, others):
+        spent = _seconds(own)
+        row += [len(spent), _spread(spent), *(["15 / - / 60"] if own is stated else [])]
+    heads = ["", "cases", "rate (95 % interval)", "asked", "calibration cases", "rate there"]
+    return ["## What is asked", "", *table(heads, [*rows, row])]
+
+
+def _seconds(lines: Sequence[Line]) -> list[float]:
+    return [float(r["cpu_s"]) for r in lines if "cpu_s" in r]
+
+
+def _spread(spent: Sequence[float]) -> str:
+    if not spent:
+        return "-"
+    return f"{np.median(spent):.0f} / {np.quantile(spent, 0.9):.0f} / {max(spent):.0f}"
+
+
+def _confidence(lines: Sequence[Line]) -> list[str]:
+    error, count = calibration_error(lines)
+    text = ["## Stated confidence", ""]
+    if not count:
+        return [*text, "None is stated."]
+    text += [
+        f"Expected calibration error {100 * error:.1f} points over {count} cases (asked: at most 5 over 600)."
+    ]
+    heads = ["stated", "cases", "mean stated", "right (95 % interval)"]
+    rows = [
+        [f"{100 * low:g} to {100 * high:g} %", n, f"{100 * mean:.1f} %", rate(right, n)]
+        for low, high, mean, right, n in binned(lines)
+    ]
+    return [*text, "", "![Reliability](images/reliability.png)", "", *table(heads, rows)]
+
+
+def _by(title: str, of: Callable[[Line], str], lines: Sequence[Line]) -> list[str]:
+    """Outcomes where one effect is hidden, and alarms where none is, by one dimension."""
+    cases: dict[str, list[Line]] = defaultdict(list)
+    for r in lines:
+        cases[of(r)].append(r)
+    rows = []
+    for value in sorted(cases, key=_natural):
+        effects = [r for r in cases[value] if r["kind"] == "effect"]
+        quiet = [r for r in cases[value] if r["kind"] in ("null", "parameter")]
+        counts = Counter(outcome(r) for r in effects)
+        alarms = rate(sum(map(false_alarm, quiet)), len(quiet))
+        cells = [rate(counts["right"], len(effects)), *(counts[o] for o in OUTCOMES[1:])]
+        rows.append([value, len(effects), *cells, len(quiet), alarms])
+    heads = [
+        "",
+        "one effect: cases",
+        "first name right",
+        *OUTCOMES[1:],
+        "nothing hidden: cases",
+        "false alarm",
+    ]
+    return [f"## By {title}", "", *table(heads, rows)]
+
+
+def _natural(text: str) -> tuple[float, str]:
+    first = text.split(" ")[0]
+    return (float(first), text) if first.replace(".", "").isdigit() else (-1.0, text)
+
+
+def _bands_of_families(lines: Sequence[Line]) -> list[str]:
+    families = list(dict.fromkeys(r["family"] for r in lines))
+    rows = []
+    for low, high in BANDS:
+        row = [f"{low:g} to {high:g}"]
+        for name in families:
+            own = [r for r in lines if r["kind"] == "effect" and r["family"] == name and band(r) == row[0]]
+            row.append(f"{rate(sum(outcome(r) == 'right' for r in own), len(own))} of {len(own)}")
+        rows.append(row)
+    text = ["## First name right by strength and family", ""]
+    return text + (table(["strength", *families], rows) if families else ["None."])
+
+
+def _time(lines: Sequence[Line]) -> list[str]:
+    """Processor seconds by family and seconds by step."""
+    rows: list[list[Any]] = []
+    for name in dict.fromkeys(r["family"] for r in lines):
+        spent = _seconds([r for r in lines if r["family"] == name])
+        rows.append([name, len(spent), _spread(spent)])
+    heads = ["family", "cases", "processor seconds: median / nine tenths / longest"]
+    text = ["## Time", "", *table(heads, rows), ""]
+    steps: dict[str, list[float]] = defaultdict(list)
+    for r in lines:
+        for step, seconds in (r.get("seconds") or {}).items():
+            steps[step].append(seconds)
+    total = sum(map(sum, steps.values())) or 1.0
+    rows = [
+        [step, f"{100 * sum(spent) / total:.0f} %", f"{np.median(spent):.1f}", f"{max(spent):.1f}"]
+        for step, spent in steps.items()
+    ]
+    return text + table(["step", "share of all time", "median s where taken", "longest"], rows)
+
+
+def _confusion(lines: Sequence[Line]) -> list[str]:
+    found: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    right: Counter[tuple[str, str]] = Counter()
+    for r in lines:
+        hidden = str(r["setup"].get("hidden", " + ".join("/".join(t) for t in r["truth"]) or "nothing"))
+        place = (r["kind"], hidden if r["kind"] in ("effect", "outside") else "")
+        ok = outcome(r) == "right"
+        found[place][said(r) if ok else f"**{said(r)}**"] += 1
+        right[place] += ok
+    rows = [
+        [*place, f"{right[place]} of {own.total()}", "; ".join(f"{w} ({n})" for w, n in own.most_common())]
+        for place, own in sorted(found.items())
+    ]
+    text = ["## Confusion", "", "Wrong ones in bold.", ""]
+    return text + table(["kind", "hidden", "right", "said"], rows)
+
+
+def _failures(lines: Sequence[Line]) -> list[str]:
+    wrong = [r for r in lines if outcome(r) != "right"]
+    rows = []
+    for r in wrong:
+        s = r["setup"]
+        experiment = f"{s.get('sensors', '-')}, {s.get('rate_hz') or 0:.0f} Hz, {s.get('held', '-')}"
+        sizes = ", ".join(f"{x:.1f}" for x in r["strength"]) or "-"
+        suspects = (r["verdict"] or {}).get("suspects")
+        words = said(r) + (f"; suspects {', '.join(suspects)}" if suspects else "")
+        rows.append(
+            [
+                r["key"],
+                f"{experiment}, {s.get('formula', '-')}",
+                sizes,
+                words,
+                r.get("closed"),
+                r.get("cpu_s"),
+            ]
+        )
+    heads = ["key", "experiment", "strength", "said", "closed", "processor s"]
+    count = f"{len(wrong)} of {len(lines)}. One again: `python tests/blind one KEY`."
+    return ["## Every wrong answer", "", count, "", *table(heads, rows)]
+
+
+def _outside_intervals(lines: Sequence[Line]) -> list[str]:
+    rows = [
+        [r["key"], path, f"{truth:.4g}", f"{value:.4g}", f"{low:.4g} to {high:.4g}"]
+        for r in lines
+        for path, truth, value, low, high, inside in r.get("numbers", [])
+        if not inside
+    ]
+    heads = ["key", "field", "truth", "fitted", "95 % interval"]
+    return ["## Numbers outside their interval", "", *table(heads, rows)]

@@ -1,0 +1,149 @@
+"""Judging, storing and the page, on lines that are written by hand."""
+
+import json
+
+import numpy as np
+import pytest
+from contract import Case, Measured
+from judging import borne_out, closed, covered, false_alarm, false_name, outcome, stated
+from page import band, page, rate
+from reliability import binned, calibration_error, picture
+from running import Task, lines_of, stored
+
+
+def line(kind, truth, verdict, *names, strength=5.0, number=0, **more):
+    effects = [
+        {"name": group[0], "indistinguishable_from": list(group[1:]), "confidence": 0.9, "parameters": {}}
+        for group in names
+    ]
+    hidden = [] if kind in ("null", "parameter") else [strength]
+    return {
+        "key": f"numpy/{kind}/x/{number}/1", "family": "numpy", "number": number, "seed": 1, "kind": kind,
+        "truth": truth, "strength": hidden, "error": None, "cpu_s": 3.0, "setup": {"sensors": "both"},
+        "verdict": {"verdict": verdict, "effects": effects, "suspects": {}}, "numbers": [], "closed": 0.95,
+    } | more  # fmt: skip
+
+
+ONE = [["stribeck_friction"]]
+TWO = [["stribeck_friction"], ["kinematic_error"]]
+
+
+@pytest.mark.parametrize(
+    ("case", "wanted"),
+    [
+        (line("effect", ONE, "effect", ["lugre_friction", "stribeck_friction"], ["unbalance"]), "right"),
+        (line("effect", ONE, "effect", ["unbalance"], ["stribeck_friction"]), "wrong name"),
+        (line("effect", ONE, "effect", ["a", "b", "c", "stribeck_friction"]), "wrong name"),
+        (line("effect", ONE, "unknown"), "unknown"),
+        (line("effect", ONE, "parameter"), "nothing"),
+        (line("pair", TWO, "effect", ["kinematic_error"], ["stribeck_friction"]), "right"),
+        (line("pair", TWO, "effect", ["kinematic_error"]), "wrong name"),
+        (line("outside", [], "unknown"), "right"),
+        (line("outside", [], "effect", ["unbalance"]), "wrong name"),
+        (line("null", [], "nothing"), "right"),
+        (line("null", [], "parameter"), "right"),
+        (line("null", [], "unknown"), "unknown"),
+        (line("parameter", [], "nothing"), "nothing"),
+        (line("parameter", [], "parameter"), "right"),
+        (line("null", [], "") | {"verdict": None, "error": "ValueError: x"}, "error"),
+    ],
+)
+def test_outcomes(case, wanted):
+    assert outcome(case) == wanted
+
+
+def test_false_names_and_alarms():
+    assert false_name(line("effect", ONE, "effect", ["unbalance"]))
+    assert not false_name(line("effect", ONE, "effect", ["a", "b", "c", "stribeck_friction"]))
+    assert not false_name(line("effect", ONE, "unknown"))
+    assert false_alarm(line("null", [], "unknown"))
+    assert false_alarm(line("null", [], "") | {"verdict": None})
+    assert not false_alarm(line("parameter", [], "nothing"))
+
+
+def test_confidence_counts_the_first_name_and_a_verdicts_own_where_there_is_one():
+    half = line("pair", TWO, "effect", ["kinematic_error"])
+    assert stated(half) == 0.9
+    assert borne_out(half)
+    silent = line("null", [], "nothing")
+    assert stated(silent) is None
+    silent["verdict"]["confidence"] = 0.7
+    assert stated(silent) == 0.7
+    assert borne_out(silent)
+
+
+def test_calibration_error_is_the_distance_of_shares_from_what_was_stated():
+    lines = [line("effect", ONE, "effect", ["stribeck_friction" if k < 6 else "x"]) for k in range(10)]
+    assert calibration_error(lines) == (pytest.approx(0.3), 10)
+    lines += [line("effect", ONE, "effect", ["stribeck_friction"]) for _ in range(10)]
+    for one in lines[10:]:
+        one["verdict"]["effects"][0]["confidence"] = 1.0
+    assert calibration_error(lines) == (pytest.approx(0.15), 20)
+    assert [n for *_, n in binned(lines)] == [10, 10]
+
+
+def test_what_can_be_closed_and_numbers_that_hold():
+    rng = np.random.default_rng(1)
+    ideal = np.zeros(4000)
+    measured = Measured(
+        "a", np.arange(4000.0), {"motor_torque": rng.normal(0, 2.0, 4000)}, {"motor_torque": ideal}
+    )
+    case = Case("numpy/effect/x/0/1", "numpy", "effect", (frozenset({"kinematic_error"}),), (measured,), (), "",
+                numbers={"components.0.order": 2.0, "components.0.phase_deg": 359.0, "load.inertia_kg_m2": 3.0})  # fmt: skip
+    gap = {"motor_torque": {"refit": 12.0, "after": 3.0, "noise": 9.0}}
+    assert closed(case, gap) == pytest.approx(0.9, abs=0.01)
+    assert closed(case, {"motor_torque": {"refit": 2.1, "after": 3.0, "noise": 9.0}}) is None
+
+    def number(value, low, high):
+        return {"value": value, "interval": [low, high]}
+
+    parameters = {
+        "components.1.order": number(2.001, 1.9, 2.1),
+        "components.1.phase_deg": number(2.0, -4.0, 8.0),
+    }
+    verdict = {"parameters": {"load.inertia_kg_m2": number(3.5, 3.2, 3.8)},
+               "effects": [{"name": "kinematic_error", "parameters": parameters}]}  # fmt: skip
+    rows = {row[0]: row[5] for row in covered(case, verdict)}
+    assert rows == {"components.0.order": True, "components.0.phase_deg": True, "load.inertia_kg_m2": False}
+    verdict["effects"][0]["name"] = "unbalance"
+    assert [row[0] for row in covered(case, verdict)] == ["load.inertia_kg_m2"]
+
+
+def test_stored_lines_come_back_the_last_of_a_case_counts_and_a_cut_one_does_not(tmp_path):
+    path = tmp_path / "lines.jsonl"
+    first, second = line("null", [], "unknown"), line("null", [], "nothing")
+    second["setup"] = {"rate_hz": np.float64(3.0), "off": frozenset({"b", "a"})}
+    other = line("null", [], "nothing", number=4)
+    text = "\n".join(stored(r) for r in (first, other, second))
+    path.write_text(text + "\n" + stored(first)[:40], encoding="utf-8")
+    found = {Task(r["family"], r["number"], r["seed"]): r for r in lines_of([path, tmp_path / "none.jsonl"])}
+    assert len(found) == 2
+    assert outcome(found[Task("numpy", 0, 1)]) == "right"
+    assert found[Task("numpy", 0, 1)]["setup"] == {"rate_hz": 3.0, "off": ["a", "b"]}
+
+
+def test_the_page_states_odd_seeds_and_the_family_left_out_alone(tmp_path):
+    lines = [line("effect", ONE, "effect", ["stribeck_friction"], number=k, strength=5.0) for k in range(8)]
+    lines += [line("effect", ONE, "effect", ["unbalance"], number=9, strength=60.0)]
+    lines += [line("effect", ONE, "unknown", number=k, seed=2) for k in range(3)]
+    lines += [line("effect", ONE, "unknown", number=k, seed=2, family="mujoco") for k in range(1)]
+    text = page(json.loads(json.dumps(lines)))
+    rows = {
+        row.split(" | ")[0].strip("| "): row.split(" | ") for row in text.splitlines() if row.startswith("|")
+    }
+    five = rows["first name right, strength 3.5 to 10"]
+    assert five[1] == "9"
+    assert five[2].startswith("89 %")
+    assert five[4] == "3"
+    assert rows["wrong first name where an effect is hidden"][2].startswith("10 %")
+    assert "2 of 10. One again" in text
+    picture(lines, tmp_path / "images" / "reliability.png")
+    assert (tmp_path / "images" / "reliability.png").stat().st_size > 5000
+
+
+def test_bands_and_rates():
+    assert band(line("effect", ONE, "unknown", strength=1.49)) == "0.5 to 1.5"
+    assert band(line("effect", ONE, "unknown", strength=1.5)) == "1.5 to 3.5"
+    assert band(line("effect", ONE, "unknown", strength=120.0)) == "35 to 100"
+    # 10 of 10: the lower end is 0.025^(1/10) (Clopper and Pearson 1934).
+    assert rate(10, 10) == f"100 % ({100 * 0.025**0.1:.0f} to 100)"
