@@ -12,9 +12,10 @@ from sensing import CHANNELS, Setup, measure, numbers, readings, truth
 from strength import strength
 
 from hdsim.effects import catalogue
-from hdsim.estimate.freedom import put, state_of
 from hdsim.estimate.predict import Candidate, predictors
 from hdsim.estimate.records import Record
+from hdsim.estimate.state import state_of
+from hdsim.nested import put
 
 MOTIONS = ("swing", "moves", "chirp", "constant", "locked", "moves")
 
