@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
+from hdsim.number import Number
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -129,8 +131,11 @@ class Effect(Part):
         title: the field's standard term, for reports.
         source: where the equation comes from.
         signature: the trace it leaves in measured data.
+        number: what its numbers say to a fit where a field's annotation (``hdsim.number``) says nothing else:
+            a source's number is often another machine's.
     """
 
     title: ClassVar[str]
     source: ClassVar[str]
     signature: ClassVar[Signature]
+    number: ClassVar[Number] = Number(0.7, far=15.0, may_vanish=True)

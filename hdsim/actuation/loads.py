@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 from pydantic import Field
 
 from hdsim.actuation._kernels import gravity_arm, load_torque
 from hdsim.actuation.signals import TorqueSignal
+from hdsim.number import Number
 from hdsim.parts import Builder, Part
 
 #: Standard acceleration of free fall, m/s^2 (ISO 80000-3).
@@ -21,7 +23,7 @@ class GravityArm(Part):
     there. The arm's inertia belongs to the load's ``inertia_kg_m2``.
     """
 
-    mass_kg: float = Field(gt=0.0)
+    mass_kg: Annotated[float, Number(0.4)] = Field(gt=0.0)
     """Mass of the arm with what it carries. Unit kg."""
     centre_of_mass_m: float = Field(gt=0.0)
     """Distance of the centre of mass from the output's axis. Unit m."""
@@ -39,7 +41,7 @@ class GravityArm(Part):
 class Load(Part):
     """What hangs on the output."""
 
-    inertia_kg_m2: float = Field(gt=0.0)
+    inertia_kg_m2: Annotated[float, Number(0.5, far=15.0)] = Field(gt=0.0)
     """Moment of inertia about the output's axis. Unit kg m^2."""
     torque: TorqueSignal | None = None
     """External torque on the output over time, positive in the direction of positive output angle."""

@@ -15,10 +15,13 @@ import numpy as np
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, designs
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, Vector, at_present, correlation, fit, sensitivities
-from hdsim.estimate.freedom import Added, State, scaled, signed
+from hdsim.estimate.covariance import correlation
+from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.numbers import scaled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
+from hdsim.estimate.state import Added, State
+from hdsim.estimate.vector import Vector, sensitivities
 
 #: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
 #: be fitted further, and from the numbers as given.
@@ -142,7 +145,7 @@ def _from_given(bench: Bench, base: Fit, given: _Point, added: Added) -> list[Fi
     # Delays stay where they are: nothing bounds them here.
     both = np.hstack([given.columns * np.array([not free.step for free in base.frees]), columns])
     found, *_ = np.linalg.lstsq(both, given.left, rcond=1e-6)
-    free = signed(added.fitting, len(added.orders))
+    free = added.fitting.signed(added.orders)
     coefficients = np.where(
         free, found[given.columns.shape[1] :], np.maximum(found[given.columns.shape[1] :], 0.0)
     )
@@ -169,7 +172,7 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
     square = point.columns.T @ point.columns + np.diag(ridge)
     away = np.array([free.none for free in frees]) - point.theta
     moves = np.linalg.solve(square, point.columns.T @ (point.left - columns @ coefficients) + ridge * away)
-    stiff = np.array(["stiffness" in free.name for free in frees], dtype=bool)
+    stiff = np.array([free.compliance for free in frees], dtype=bool)
     series = added.fitting.in_series
     if series:
         # Beside a compliance it is the drive's own compliance, not its stiffness, that moves in proportion.

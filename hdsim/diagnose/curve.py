@@ -22,9 +22,11 @@ from hdsim.diagnose.search import left_of
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects.table import COORDINATE_UNITS, Acting, Coordinate, TableCurve, cells
 from hdsim.estimate.bench import Bench, Series
-from hdsim.estimate.fit import COEFFICIENT_PRIOR, Fit
-from hdsim.estimate.freedom import Added, State, scaled
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.numbers import scaled
 from hdsim.estimate.records import Array
+from hdsim.estimate.state import Added, State
+from hdsim.estimate.vector import COEFFICIENT_PRIOR
 
 #: Corners of a curve, of a curve over a period, and of the fine curve that says where corners are needed.
 CORNERS, ROUND_CORNERS, FINE = 14, 12, 80

@@ -29,10 +29,12 @@ from hdsim.diagnose.experiments import Experiment, experiments, limits_of
 from hdsim.diagnose.further import Candidate, NextExperiment
 from hdsim.errors import InputError
 from hdsim.estimate.bench import THREADS, Bench
-from hdsim.estimate.fit import Fit, Vector, correlation
-from hdsim.estimate.freedom import State
+from hdsim.estimate.covariance import correlation
+from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import LEAD_IN_S
 from hdsim.estimate.records import CHANNELS, Array
+from hdsim.estimate.state import State
+from hdsim.estimate.vector import Vector
 from hdsim.plot import units
 
 #: Rate at which experiments are simulated, Hz; the noise counts at the rate of the data.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.freedom import State
+from hdsim.estimate.state import State
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData

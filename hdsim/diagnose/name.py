@@ -105,9 +105,7 @@ def name_effect(
 
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
     shortlist = shortlist[:SHORTLIST]
-    softer = any(
-        "stiffness" in free.name and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True)
-    )
+    softer = any(free.compliance and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True))
     if softer and any(one.added.fitting.in_series for one in shortlist):
         # The re-fit may have taken any compliance in series for the drive's own.
         shortlist += [one for one in screening.ranked if one.added.fitting.in_series and one not in shortlist]

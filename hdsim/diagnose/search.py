@@ -26,10 +26,10 @@ from hdsim.diagnose.traces import Screening, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, at_present, fit
-from hdsim.estimate.freedom import State
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import align, reweigh, with_delays
+from hdsim.estimate.state import State
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7

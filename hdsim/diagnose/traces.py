@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from hdsim.diagnose.locate import Line, Place
 from hdsim.diagnose.screen import Residual, Share, chance_of
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import WIDER, Amplitude, Fitting, Inverse, Periodic
+from hdsim.effects._fitting import WIDER, Fitting
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.freedom import Added, State, number_at, signed
 from hdsim.estimate.predict import CARRIED, PredictionError
 from hdsim.estimate.records import Array
+from hdsim.estimate.state import Added, State, number_at
 
 #: Orders of a periodic term that are taken from the spectra.
 MOST_ORDERS = 3
@@ -126,7 +125,7 @@ def screen(
         for added, columns in found_traces:
             if columns is None or not np.any(columns):
                 continue
-            share = _allowed(residual, columns, signed(added.fitting, len(added.orders)))
+            share = _allowed(residual, columns, added.fitting.signed(added.orders))
             shares.append(share)
             key = added.effect, added.fitting.label
             if key not in kinds or share.share > kinds[key].share.share:
@@ -170,31 +169,19 @@ def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[s
     Returns:
         Nothing when the record does not give what the fitting asks for.
     """
-    if any(isinstance(t, Amplitude) and t.of_range and t.of_range not in ranges for t in fitting.terms):
+    own = fitting.within(ranges)
+    if own is None:
         return []
-    shapes = [
-        replace(
-            s, starts=tuple(v / ranges[s.over_range] for v in s.starts),
-            least=s.least / ranges[s.over_range], most=s.most / ranges[s.over_range], over_range="",
-        )
-        if s.over_range else s
-        for s in fitting.shapes
-    ]  # fmt: skip
-    fitting = replace(
-        fitting, terms=tuple(_sized(term, ranges) for term in fitting.terms), shapes=tuple(shapes)
-    )
     orders: tuple[float, ...] = ()
-    for term in fitting.terms:
-        if isinstance(term, Periodic):
-            own = [line.order for line in lines if line.channel == term.channel and line.order >= 1.0]
-            own = [order for order in own if not any(abs(order - o) < 0.05 for o in term.besides)]
-            orders = tuple(own[:MOST_ORDERS])
-            if not orders and not term.besides:
-                return []
-    count = len(signed(fitting, len(orders)))
+    peaks = [(line.channel, line.order) for line in lines]
+    for term in own.terms:
+        read = term.orders_among(peaks, MOST_ORDERS)
+        if read is None:
+            return []
+        orders = read or orders
     return [
-        Added(name, fitting, (1.0,) * count, tuple(values), orders)
-        for values in product(*(shape.starts for shape in fitting.shapes))
+        Added(name, own, (1.0,) * own.count(orders), tuple(values), orders)
+        for values in product(*(shape.starts for shape in own.shapes))
     ]
 
 
@@ -208,25 +195,13 @@ def _neighbours(added: Added, times: int) -> list[Added]:
     found = []
     if added.fitting.play:
         for factor in (WIDER ** (-(0.5 ** (times + 1))), WIDER ** (0.5 ** (times + 1))):
-            terms = tuple(_scaled(term, factor) for term in added.fitting.terms)
-            found.append(
-                replace(
-                    added,
-                    fitting=replace(added.fitting, terms=terms),
-                    coefficients=(1.0,) * len(added.coefficients),
-                )
-            )
+            units = (1.0,) * len(added.coefficients)
+            found.append(replace(added, fitting=added.fitting.rescaled(factor), coefficients=units))
     for k, shape in enumerate(added.fitting.shapes):
         for value in shape.neighbours(added.shapes[k], times):
             shapes = (*added.shapes[:k], value, *added.shapes[k + 1 :])
             found.append(replace(added, coefficients=(1.0,) * len(added.coefficients), shapes=shapes))
     return found
-
-
-def _sized(term: Any, ranges: Mapping[str, float]) -> Any:
-    if not isinstance(term, Amplitude) or not term.of_range:
-        return term
-    return replace(_scaled(term, ranges[term.of_range]), of_range="")
 
 
 def behind_sensor(
@@ -276,8 +251,7 @@ def traces(
         size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
         if size > 0 and not wanted / FITTING < size < wanted * FITTING:
             factor = float(np.clip(wanted / size, 1e-3, 1e5))
-            terms = tuple(_scaled(term, factor) for term in added.fitting.terms)
-            again[k] = replace(added, fitting=replace(added.fitting, terms=terms))
+            again[k] = replace(added, fitting=added.fitting.rescaled(factor))
     for (k, added), columns in zip(
         again.items(), designs(bench, state, predictions, list(again.values())), strict=True
     ):
@@ -311,13 +285,6 @@ def designs(
                 before = one
         found.append(np.column_stack(columns) if len(columns) == len(own) else None)
     return found
-
-
-def _scaled(term: Any, factor: float) -> Any:
-    """A term whose unit is worth ``factor`` times as much."""
-    if isinstance(term, Amplitude):
-        return replace(term, units={path: unit * factor for path, unit in term.units.items()})
-    return replace(term, unit=term.unit / factor if isinstance(term, Inverse) else term.unit * factor)
 
 
 def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:

@@ -23,11 +23,12 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import Check, check_record
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
-from hdsim.estimate.freedom import Interval, State, state_of
+from hdsim.estimate.numbers import Interval
 from hdsim.estimate.predict import LoadSource, Locked, PredictionError, predictors
 from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record, record_from
 from hdsim.estimate.refit import Refit, refit, tie
+from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, suspicions
 from hdsim.estimate.write import fitted_numbers
 

@@ -7,10 +7,23 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from hdsim.contact.parameters import ContactParameters, MajumdarBhushanParameters
+from hdsim.number import Number
 from hdsim.parts import Parameters
 from hdsim.surface.parameters import RoughFlanks
 
 Arrangement = Literal["circular_spline_fixed", "flexspline_fixed"]
+
+
+def _elastic(drive: Drive) -> bool:
+    """Whether the drive has a torsion spring."""
+    return drive.mesh.model != "rigid"
+
+
+#: Sections of the torsion spring: a catalogue's scatter is that of one casting, so they scale together.
+_STIFFNESS = Number(0.4, group="stiffness", compliance=True, matters=_elastic)
+#: Friction and damping differ more between two drives of a size, and with grease and temperature.
+_FRICTION = Number(0.7, far=15.0, may_vanish=True)
+_DAMPING = Number(1.0, matters=_elastic, far=15.0, may_vanish=True)
 
 
 class Geometry(Parameters):
@@ -38,11 +51,11 @@ class Geometry(Parameters):
 class Torsion(Parameters):
     """Torsional stiffness of the whole drive at the output, input locked, in three segments."""
 
-    stiffness_k1_nm_per_rad: float = Field(gt=0)
+    stiffness_k1_nm_per_rad: Annotated[float, _STIFFNESS] = Field(gt=0)
     """Secant stiffness from 0 to the first torque, N m/rad."""
-    stiffness_k2_nm_per_rad: float = Field(gt=0)
+    stiffness_k2_nm_per_rad: Annotated[float, _STIFFNESS] = Field(gt=0)
     """Secant stiffness from the first to the second torque, N m/rad."""
-    stiffness_k3_nm_per_rad: float = Field(gt=0)
+    stiffness_k3_nm_per_rad: Annotated[float, _STIFFNESS] = Field(gt=0)
     """Stiffness above the second torque, N m/rad."""
     torque_t1_nm: float = Field(gt=0)
     """End of the first segment, N m."""
@@ -52,7 +65,7 @@ class Torsion(Parameters):
     """Share of the chain that is the wave generator's bearing, as a stiffness at the output, N m/rad."""
     corner_smoothing_nm: float = Field(0.0, ge=0)
     """Half-width in torque over which a corner between two segments is rounded (0: sharp), N m."""
-    damping_nm_s_per_rad: float = Field(0.0, ge=0)
+    damping_nm_s_per_rad: Annotated[float, _DAMPING] = Field(0.0, ge=0)
     """Viscous damping parallel to the torsion spring, at the output, N m s/rad."""
 
     @model_validator(mode="after")
@@ -67,7 +80,7 @@ class Torsion(Parameters):
 class Inertia(Parameters):
     """Moments of inertia of the drive's own parts; the load's belongs to the load."""
 
-    motor_kg_m2: float = Field(0.5e-4, gt=0)
+    motor_kg_m2: Annotated[float, Number(0.5, far=15.0)] = Field(0.5e-4, gt=0)
     """Motor rotor with what sits on its shaft, kg m^2."""
     wave_generator_kg_m2: float = Field(0.193e-4, ge=0)
     """Wave generator with its bearing's inner ring, kg m^2."""
@@ -81,11 +94,11 @@ class Friction(Parameters):
     The sign is tanh(speed / smoothing speed): below the smoothing speed the drive creeps instead of sticking.
     """
 
-    coulomb_nm: float = Field(0.0, ge=0)
+    coulomb_nm: Annotated[float, _FRICTION] = Field(0.0, ge=0)
     """Coulomb friction at the motor shaft, N m."""
-    viscous_nm_s_per_rad: float = Field(0.0, ge=0)
+    viscous_nm_s_per_rad: Annotated[float, _FRICTION] = Field(0.0, ge=0)
     """Viscous friction at the motor shaft, N m s/rad."""
-    load_coefficient: float = Field(0.0, ge=0, lt=1)
+    load_coefficient: Annotated[float, _FRICTION] = Field(0.0, ge=0, lt=1)
     """Share of the transmitted torque, reduced to the motor shaft, that is lost in the mesh (c_L)."""
     smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
     """Motor speed over which sign(speed) is smoothed, rad/s."""

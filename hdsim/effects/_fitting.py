@@ -8,73 +8,40 @@ diagnosis simulates each term once at its unit size and has the trace that the e
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from hdsim.effects._terms import (
+    INSIDE,
+    LIMIT,
+    Amplitude,
+    Harmonic,
+    Inverse,
+    Limits,
+    Periodic,
+    Ranged,
+    Term,
+)
+from hdsim.nested import copied, put
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["WIDER", "Amplitude", "Fitting", "Harmonic", "Inverse", "Limits", "Periodic", "Ranged", "Shape"]
 
 #: Ratio to the next start that a lone one would have, and of the widths of a play that are tried.
 ALONE, WIDER = 6.0, 3.0
-
-
-@dataclass(frozen=True)
-class Amplitude:
-    """Fields that grow in proportion to one coefficient.
-
-    Args:
-        units: field to its value at coefficient 1.
-        signed: the coefficient may be negative.
-        of_range: the units are parts of a range that the record covers: ``twist_arcmin``, if any.
-        play: the units are the width of a play in series with the drive's spring. Its trace beside the
-            spring's is the spring beyond the play: its size says how stiff that is, not how wide the play.
-    """
-
-    units: Mapping[str, float]
-    signed: bool = False
-    of_range: str = ""
-    play: bool = False
-
-
-@dataclass(frozen=True)
-class Inverse:
-    """A stiffness in series: the field is ``unit`` over the coefficient."""
-
-    path: str
-    unit: float
-
-
-@dataclass(frozen=True)
-class Harmonic:
-    """Amplitude and phase of sin(angle + phase): two coefficients, of the sine and of the cosine."""
-
-    amplitude: str
-    phase: str
-    unit: float
-
-
-@dataclass(frozen=True)
-class Periodic:
-    """Harmonics whose orders per wave-generator turn are read from the data; one list item each.
-
-    Args:
-        section: path of the list.
-        amplitude: field of an item that is its amplitude.
-        unit: its value at coefficient 1.
-        settings: further fields of an item.
-        channel: the channel whose order spectrum says which orders.
-        besides: orders that the fitting's other terms have; given, the term may find no other ones.
-    """
-
-    section: str
-    amplitude: str
-    unit: float
-    channel: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    besides: tuple[float, ...] = ()
+#: Largest logarithm of the factor to either end of an interval: e^20 says enough of what nobody knows.
+WIDEST = 20.0
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A field in which the trace is not linear.
+    """A field in which the trace is not linear. A fit moves its logarithm, or itself where it is ``linear``.
 
     Args:
         path: of the field.
@@ -102,10 +69,70 @@ class Shape:
         """
         part = 0.5 ** (times + 1)
         if self.linear:
-            gap = part * (self.starts[1] - self.starts[0])
-            return value - gap, value + gap
+            return value - part * self.distance, value + part * self.distance
         ratio = self.starts[1] / self.starts[0] if len(self.starts) > 1 else ALONE
         return max(float(value / ratio**part), self.least), min(float(value * ratio**part), self.most)
+
+    @property
+    def distance(self) -> float:
+        """Of two starts of a linear shape: the unit in which a fit moves it."""
+        return self.starts[1] - self.starts[0] if len(self.starts) > 1 else max(abs(self.starts[0]), 1.0)
+
+    def number(self, value: float) -> float:
+        """What a fit moves, at a value of the field."""
+        return value / self.distance if self.linear else math.log(value)
+
+    def value(self, number: float) -> float:
+        """The field's value at what a fit moves."""
+        return number * self.distance if self.linear else math.exp(number)
+
+    def ends(self, limits: Limits) -> tuple[float, float]:
+        """Least and largest value of the field: this fitting's, within the field's own."""
+        low, high = limits(self.path)
+        if self.linear:
+            return low, high
+        inside = 1.0 - INSIDE
+        return max(self.least, low / inside if low > 0 else 0.0), min(self.most, inside * high)
+
+    def bounds(self, limits: Limits) -> tuple[float, float]:
+        """The same of what a fit moves."""
+        low, high = self.ends(limits)
+        if self.linear:
+            return low / self.distance, high / self.distance
+        return math.log(low) if low > 0 else -math.inf, math.log(high)
+
+    def at_end(self, value: float, plausible: Limits) -> bool:
+        """Whether a value stands at an end of its range; what is linear has none that means anything else."""
+        if self.linear:
+            return False
+        low, high = plausible(self.path)
+        return value <= max(self.least, low) * (1.0 + LIMIT) or value >= min(self.most, high) / (1.0 + LIMIT)
+
+    def within(self, ranges: Mapping[str, float]) -> Shape:
+        """The shape with its values divided by what they are over."""
+        if not self.over_range:
+            return self
+        over = ranges[self.over_range]
+        return replace(
+            self,
+            starts=tuple(value / over for value in self.starts),
+            least=self.least / over,
+            most=self.most / over,
+            over_range="",
+        )
+
+    def report(self, value: float, deviation: float) -> Ranged:
+        """Value and 95 % interval.
+
+        Args:
+            value: as fitted.
+            deviation: standard deviation of what the fit moves.
+        """
+        if self.linear:
+            half = 2.0 * deviation * self.distance
+            return Ranged(value, value - half, value + half)
+        factor = math.exp(min(2.0 * deviation, WIDEST))
+        return Ranged(value, value / factor, value * factor)
 
 
 @dataclass(frozen=True)
@@ -123,7 +150,7 @@ class Fitting:
         cumulative: a term has a meaning only on top of those before it, and adds to their fields.
     """
 
-    terms: tuple[Amplitude | Inverse | Harmonic | Periodic, ...]
+    terms: tuple[Term, ...]
     shapes: tuple[Shape, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
@@ -135,12 +162,84 @@ class Fitting:
     @property
     def in_series(self) -> bool:
         """Whether it fits a compliance in series with the drive's spring."""
-        return any(isinstance(term, Inverse) for term in self.terms)
+        return any(term.series_field for term in self.terms)
 
     @property
     def play(self) -> bool:
         """Whether it fits the width of a play."""
-        return any(isinstance(term, Amplitude) and term.play for term in self.terms)
+        return any(term.play for term in self.terms)
+
+    def count(self, orders: Sequence[float]) -> int:
+        """Number of coefficients."""
+        return sum(term.count(orders) for term in self.terms)
+
+    def signed(self, orders: Sequence[float]) -> list[bool]:
+        """Whether each coefficient may be negative."""
+        return [term.may_be_negative() for term in self.terms for _ in range(term.count(orders))]
+
+    def bounds(self, limits: Limits, orders: Sequence[float]) -> list[tuple[float, float]]:
+        """Least and largest value of each coefficient."""
+        return [term.bounds(limits) for term in self.terms for _ in range(term.count(orders))]
+
+    def parts(self, orders: Sequence[float]) -> list[tuple[Term, slice]]:
+        """Each term with where its coefficients stand."""
+        found, first = [], 0
+        for term in self.terms:
+            last = first + term.count(orders)
+            found.append((term, slice(first, last)))
+            first = last
+        return found
+
+    def rescaled(self, factor: float) -> Fitting:
+        """The same way with units that are worth ``factor`` times as much."""
+        return replace(self, terms=tuple(term.rescaled(factor) for term in self.terms))
+
+    def within(self, ranges: Mapping[str, float]) -> Fitting | None:
+        """The same way for a record that covers these ranges; None where it lacks one that a term needs."""
+        if any(term.of_range and term.of_range not in ranges for term in self.terms):
+            return None
+        return replace(
+            self,
+            terms=tuple(term.sized(ranges) for term in self.terms),
+            shapes=tuple(shape.within(ranges) for shape in self.shapes),
+        )
+
+    def written(
+        self, coefficients: Sequence[float], shapes: Sequence[float], orders: Sequence[float]
+    ) -> dict[str, Any]:
+        """Values of the effect's fields, nested."""
+        data: dict[str, Any] = copied(self.settings)
+        for shape, value in zip(self.shapes, shapes, strict=True):
+            put(data, shape.path, value)
+        before: dict[str, float] = {}
+        for term, part in self.parts(orders):
+            term.write(data, coefficients[part], orders, before)
+        return data
+
+    def report(
+        self,
+        coefficients: Sequence[float],
+        covariance: Array,
+        shapes: Sequence[float],
+        deviations: Sequence[float] | Array,
+        orders: Sequence[float],
+    ) -> dict[str, Ranged]:
+        """The fitted fields with 95 % intervals.
+
+        Args:
+            coefficients: one for each column of the terms.
+            covariance: of the coefficients, shape (k, k).
+            shapes: values of the shapes.
+            deviations: standard deviations of what the fit moves of them.
+            orders: orders of periodic terms.
+        """
+        found: dict[str, Ranged] = {}
+        for term, part in self.parts(orders):
+            items = len(self.items(term.list_path)) if term.list_path else 0
+            term.report(found, coefficients[part], covariance[part, part], orders, items)
+        for shape, value, deviation in zip(self.shapes, shapes, deviations, strict=True):
+            found[shape.path] = shape.report(value, float(deviation))
+        return found
 
     def items(self, section: str) -> list[Any]:
         """Items that a list of the effect has before periodic terms add theirs."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.effects._kernels import ARCMIN
 from hdsim.kernel import twist
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 
@@ -76,9 +77,9 @@ class DamagedTooth(Effect):
 
     amplitude_arcmin: float = -0.2
     """Height of the bump as an angle at the output, arcmin (negative: material is missing)."""
-    width_deg: float = Field(8.0, gt=0, le=60)
+    width_deg: Annotated[float, FIXED] = Field(8.0, gt=0, le=60)
     """Standard deviation s of the bump, degrees of the wave generator."""
-    position_deg: float = 0.0
+    position_deg: Annotated[float, FIXED] = 0.0
     """Angle of the wave generator, at zero output angle, at which lobe 1 is on the tooth, degrees."""
     member: Literal["output", "fixed"] = "output"
     """The spline that has the damage: the one that turns with the output, or the fixed one."""

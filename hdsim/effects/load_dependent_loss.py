@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, TRANSMITTED_TORQUE, element
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 
@@ -55,9 +56,9 @@ class LoadDependentLoss(Effect):
 
     coefficient: float = Field(0.03, ge=0, lt=1)
     """Share of the transmitted torque, reduced to the motor, that is lost on top of the drive's own, c_L."""
-    smoothing_torque_nm: float = Field(0.5, gt=0)
+    smoothing_torque_nm: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Output torque tau_s over which |tau| is rounded, N m."""
-    smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
+    smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Motor speed w_s over which the sign is smoothed, rad/s."""
 
     def contribute(self, build: Builder) -> None:

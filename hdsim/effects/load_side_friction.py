@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects._kernels import coulomb_viscous
 from hdsim.kernel import OUTPUT_TORQUE
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 
@@ -39,7 +40,7 @@ class LoadSideFriction(Effect):
     """Coulomb friction T_c at the output, N m."""
     viscous_nm_s_per_rad: float = Field(0.5, ge=0)
     """Viscous friction b at the output, N m s/rad."""
-    smoothing_velocity_rad_per_s: float = Field(0.005, gt=0)
+    smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.005, gt=0)
     """Output speed w_s over which the sign is smoothed, rad/s."""
 
     def contribute(self, build: Builder) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.effects._kernels import harmonics
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 
@@ -32,9 +33,9 @@ class OutputEccentricity(Effect):
 
     eccentricity_um: float = Field(2.0, ge=0)
     """Run-out (offset of the centres) d, um."""
-    radius_mm: float = Field(25.0, gt=0)
+    radius_mm: Annotated[float, FIXED] = Field(25.0, gt=0)
     """Radius r on which the torque passes to the output, mm."""
-    phase_deg: float = 0.0
+    phase_deg: Annotated[float, FIXED] = 0.0
     """Phase at zero output angle, degrees."""
 
     def contribute(self, build: Builder) -> None:

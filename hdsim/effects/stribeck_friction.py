@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, element
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 
@@ -58,7 +59,7 @@ class StribeckFriction(Effect):
     """Static minus Coulomb friction at the motor shaft, T_s - T_c, N m."""
     stribeck_velocity_rad_per_s: float = Field(5.0, gt=0)
     """Motor speed v_s over which the extra friction decays, rad/s."""
-    smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
+    smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Motor speed w_s over which the sign is smoothed, rad/s; well below v_s, or the bump is lost."""
 
     def contribute(self, build: Builder) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, element
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature, State
 
 
@@ -74,11 +75,11 @@ class ThermalFriction(Effect):
     """Heat capacity C of drive and housing, J/K (about 1 kg of steel)."""
     thermal_resistance_k_per_w: float = Field(1.5, gt=0)
     """Thermal resistance R to the ambient, K/W."""
-    ambient_degc: float = Field(20.0, ge=-60, le=150)
+    ambient_degc: Annotated[float, FIXED] = Field(20.0, ge=-60, le=150)
     """Ambient temperature T_a, degC."""
-    initial_degc: float | None = Field(None, ge=-60, le=150)
+    initial_degc: Annotated[float | None, FIXED] = Field(None, ge=-60, le=150)
     """Temperature at the start, degC (null: ambient)."""
-    reference_degc: float = Field(20.0, ge=-60, le=150)
+    reference_degc: Annotated[float, FIXED] = Field(20.0, ge=-60, le=150)
     """Temperature T_0 at which the drive's friction is given, degC."""
     viscosity_coefficient_per_k: float = Field(0.033, ge=0, le=0.2)
     """Relative decay of viscous friction, beta, 1/K."""
@@ -88,7 +89,7 @@ class ThermalFriction(Effect):
     """Part of the input's Coulomb friction at T_0 that changes with temperature, N m; at most all of it."""
     coulomb_coefficient_per_k: float = Field(0.01, ge=0, le=0.2)
     """Relative decay of that part, beta_c, 1/K."""
-    smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
+    smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Motor speed over which the sign of Coulomb friction is smoothed, rad/s; as in the drive."""
 
     def contribute(self, build: Builder) -> None:

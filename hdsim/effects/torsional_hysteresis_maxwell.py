@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
 
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Parameters, Signature, State
 
 
@@ -87,7 +88,7 @@ class TorsionalHysteresisMaxwell(Effect):
     """Total torque of all sliders, N m: half of the loop's width in torque, at full slip."""
     slip_twists_mrad: tuple[float, ...] = Field((0.1, 0.3, 0.8), min_length=1)
     """Twists at which equal shares of the torque slip, from rest, mrad."""
-    sharpness: float = Field(12.0, ge=1, le=100)
+    sharpness: Annotated[float, FIXED] = Field(12.0, ge=1, le=100)
     """Exponent p: how suddenly an element slips; above about 20 it asks for small steps."""
 
     @model_validator(mode="after")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.kernel import MOTOR_TORQUE, OUTPUT_TORQUE, STORED, element
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 STANDARD_GRAVITY = 9.80665  #: m/s^2
@@ -57,13 +58,13 @@ class Unbalance(Effect):
 
     output_kg_m: float = Field(0.1, ge=0)
     """Static unbalance m r at the output, kg m."""
-    output_phase_deg: float = 0.0
+    output_phase_deg: Annotated[float, FIXED] = 0.0
     """Elevation of the output's centre of mass above the horizontal at zero output angle, degrees."""
     motor_kg_m: float = Field(0.0, ge=0)
     """Static unbalance m r of the motor's rotor and wave generator, kg m."""
-    motor_phase_deg: float = 0.0
+    motor_phase_deg: Annotated[float, FIXED] = 0.0
     """Elevation of the rotor's centre of mass above the horizontal at zero motor angle, degrees."""
-    gravity_m_per_s2: float = Field(STANDARD_GRAVITY, ge=0)
+    gravity_m_per_s2: Annotated[float, FIXED] = Field(STANDARD_GRAVITY, ge=0)
     """Component of gravity across the axis of rotation, m/s^2 (0: vertical axis)."""
 
     def contribute(self, build: Builder) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.effects._kernels import harmonics
+from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 
@@ -46,9 +47,9 @@ class WaveGeneratorEccentricity(Effect):
     """Offset d of the axes of wave generator and fixed spline, um."""
     lobe_imbalance: float = Field(0.02, ge=0, le=1)
     """Difference of the two lobes' shares of the load, beta (0: equal)."""
-    pitch_radius_mm: float = Field(25.0, gt=0)
+    pitch_radius_mm: Annotated[float, FIXED] = Field(25.0, gt=0)
     """Radius on which the teeth meet, mm."""
-    phase_deg: float = 0.0
+    phase_deg: Annotated[float, FIXED] = 0.0
     """Phase at zero motor angle, degrees."""
 
     def contribute(self, build: Builder) -> None:

@@ -16,7 +16,7 @@ from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
-    from hdsim.estimate.freedom import State
+    from hdsim.estimate.state import State
 
 #: Models that are simulated at the same time, in threads: the compiled solver lets go of the interpreter.
 THREADS = min(4, os.cpu_count() or 1)

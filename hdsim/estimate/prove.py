@@ -8,8 +8,8 @@ import numpy as np
 
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Gap
-from hdsim.estimate.freedom import State
 from hdsim.estimate.records import CHANNELS, Array
+from hdsim.estimate.state import State
 
 #: Draws of blocks for the intervals.
 DRAWS = 500

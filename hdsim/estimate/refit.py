@@ -9,17 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import (
-    Fit,
-    Vector,
-    at_present,
-    base_intervals,
-    fit,
-    robust_covariance,
-    sensitivities,
-)
-from hdsim.estimate.freedom import Free, Interval, State, base_freedoms, delay_freedoms
+from hdsim.estimate.covariance import robust_covariance
+from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
+from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
+from hdsim.estimate.state import State
+from hdsim.estimate.vector import Vector, sensitivities
 
 #: Part of what the number that can do most alone can do, for another to do as well.
 ALONE = 0.8

@@ -15,27 +15,16 @@ import numpy as np
 
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import Problem, explain, slope
-from hdsim.estimate.freedom import Interval, State
+from hdsim.estimate.numbers import Interval
 from hdsim.estimate.predict import Predictor
 from hdsim.estimate.records import Array, Mask
 from hdsim.estimate.refit import Refit
+from hdsim.estimate.state import State
 
-#: Factor between measurement and model beyond which a number is suspect, by the last part of its name.
-#: Friction and damping differ more between two drives of a size, and with grease and temperature; a fitted
-#: inertia is bent by friction that the model lacks, so its own part of the torque is looked at instead.
-FAR = {
-    "channel": 4.0,
-    "motor_torque_gain": 2.0,
-    "coulomb_nm": 15.0,
-    "viscous_nm_s_per_rad": 15.0,
-    "load_coefficient": 15.0,
-    "damping_nm_s_per_rad": 15.0,
-    "motor_kg_m2": 15.0,
-    "inertia_kg_m2": 15.0,
-}
-FAR_OTHERWISE = 5.0
-#: Numbers of a drive that may well be far smaller than thought.
-MAYBE_NONE = ("coulomb_nm", "viscous_nm_s_per_rad", "load_coefficient", "damping_nm_s_per_rad")
+#: Factor between a measured channel and its prediction beyond which its unit is suspect. A number of the
+#: model declares its own at its field; a fitted inertia is bent by friction that the model lacks, so its own
+#: part of the torque is looked at instead.
+FAR_CHANNEL = 4.0
 #: Least delay that is told, samples.
 LATE = 0.5
 #: Share of a channel's variation that one factor must explain to be evidence, and how near a cause must be.
@@ -76,8 +65,7 @@ def delays(bench: Bench, intervals: Sequence[Interval]) -> list[Problem]:
     record = bench.predictors[0].record
     found = []
     for one in intervals:
-        channel, is_delay, _ = one.name.partition("_delay_s")
-        if not is_delay or one.low <= 0.0 <= one.high or abs(one.value) < LATE * record.period_s:
+        if not one.delay_of or one.low <= 0.0 <= one.high or abs(one.value) < LATE * record.period_s:
             continue
         side = "late" if one.value > 0 else "early"
         message = (
@@ -85,7 +73,7 @@ def delays(bench: Bench, intervals: Sequence[Interval]) -> list[Problem]:
             f"({abs(one.value) / record.period_s:.2g} samples; 95 % interval {1e3 * one.low:.2g} to "
             f"{1e3 * one.high:.2g} ms); the fits take that into account"
         )
-        found.append(Problem(record.name, channel, "clock", "info", message))
+        found.append(Problem(record.name, one.delay_of, "clock", "info", message))
     return found
 
 
@@ -103,7 +91,7 @@ def _scales(bench: Bench, before: list[Array]) -> list[Problem]:
             ("what the model predicts", whole, EXPLAINED),
             ("the part of the model's prediction that follows the acceleration", part, EXPLAINED_PART),
         ):
-            if explained < least or 1.0 / FAR["channel"] < factor < FAR["channel"]:
+            if explained < least or 1.0 / FAR_CHANNEL < factor < FAR_CHANNEL:
                 continue
             kind, text = explain(factor, predictor.ratio, NEAR) or ("unit", "in a wrong unit")
             message = (
@@ -149,13 +137,13 @@ def _numbers(bench: Bench, base: Refit, after: list[Array], scales: list[Problem
             worse.append(f"{series.channel} is missed by {rests[1] / varies:.2g} times its own variation")
     far = []
     for free, theta in zip(base.fit.frees, base.fit.theta, strict=True):
-        if free.step:
+        if free.delay_of:
             continue  # a delay has no scale to be far from
-        limit = FAR.get(free.name.rpartition(".")[2], FAR_OTHERWISE)
+        limit = math.log(free.far)
         # A number that closes no gap has only been bent by something that is missing; friction and
         # damping may be nothing.
-        least = math.inf if free.name.rpartition(".")[2] in MAYBE_NONE else math.log(limit)
-        if closed and not -least <= theta <= math.log(limit):
+        least = math.inf if free.may_vanish else limit
+        if closed and not -least <= theta <= limit:
             bound = ", the bound of the search" if abs(theta) > 2.99 else ""
             far.append(f"{free.name} is {math.exp(theta):.3g} times the model's{bound}")
     if not far and not worse:

@@ -18,7 +18,7 @@ UNITS = {
     "rpm": "rpm", "s": "s", "s2": "s^2", "ms": "ms", "us": "us", "hz": "Hz", "kg": "kg", "m": "m",
     "m2": "m^2", "mm": "mm", "um": "um", "pa": "Pa", "mpa": "MPa", "gpa": "GPa", "w": "W", "j": "J", "k": "K",
     "a": "A", "degc": "degC", "arcsec": "arcsec", "s3": "s^3", "ohm": "ohm", "h": "H", "percent": "%",
-    "turns": "turns",
+    "turns": "turns", "rad3": "rad^3", "mrad": "mrad",
 }  # fmt: skip
 
 

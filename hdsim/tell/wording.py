@@ -11,6 +11,7 @@ from hdsim.diagnose.name import LEVEL
 from hdsim.diagnose.verdict import NamedEffect, Verdict
 from hdsim.estimate.found import FittedNumber, Gap
 from hdsim.plot import units
+from hdsim.scenario.fields import split_unit
 
 if TYPE_CHECKING:
     from hdsim.diagnose.workflow import Diagnosis
@@ -38,30 +39,8 @@ _FAR = ((6.0, "Very sure"), (3.5, "Sure"), (0.0, "Fairly sure"))
 #: Standard deviations in a 95 % interval, from end to end; intervals are made of two to each side.
 _INTERVAL = 4.0
 
-_UNITS = {
-    "nm_s_per_rad": "N m s/rad",
-    "nm_per_rad": "N m/rad",
-    "rad_per_s": "rad/s",
-    "nm_per_k": "N m/K",
-    "kg_m2": "kg m²",
-    "per_k": "1/K",
-    "per_rad": "1/rad",
-    "arcmin": "arcmin",
-    "arcsec": "arcsec",
-    "deg": "deg",
-    "degc": "°C",
-    "rad": "rad",
-    "kg": "kg",
-    "nm": "N m",
-    "ms": "ms",
-    "hz": "Hz",
-    "um": "µm",
-    "mm": "mm",
-    "m": "m",
-    "s": "s",
-    "n": "N",
-    "k": "K",
-}
+#: How a unit is printed where it is not as scenarios write it.
+_PRINTED = {"degC": "°C", "um": "µm", "^2": "²", "^3": "³"}
 
 
 @dataclass(frozen=True)
@@ -116,11 +95,9 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
         settings: of the effect, where the path leads into one; they tell the orders of harmonics.
     """
     parts = path.split(".")
-    last, unit = parts[-1], ""
-    for suffix in sorted(_UNITS, key=len, reverse=True):
-        if last.endswith(f"_{suffix}"):
-            last, unit = last.removesuffix(f"_{suffix}"), _UNITS[suffix]
-            break
+    last, unit = split_unit(parts[-1])
+    for plain, printed in _PRINTED.items():
+        unit = unit.replace(plain, printed)
     sections: list[str] = []
     here: Any = settings
     for part in parts[:-1]:
@@ -134,7 +111,7 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
             sections[-1:] = [f"order {here['order']:g}{turn}"]
         elif part != "drive":
             sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
-    return ", ".join([*sections, spoken(last)]), unit
+    return ", ".join([*sections, last]), unit
 
 
 def unit_of(gap: Gap) -> units.Unit:

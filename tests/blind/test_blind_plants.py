@@ -13,9 +13,10 @@ from strength import strength, unresolved
 
 import hdsim
 from hdsim.effects import catalogue
-from hdsim.estimate.freedom import put, state_of
 from hdsim.estimate.predict import Candidate, predictors
 from hdsim.estimate.records import Record
+from hdsim.estimate.state import state_of
+from hdsim.nested import put
 
 MOTIONS = ("swing", "moves", "chirp", "constant", "locked", "moves")
 

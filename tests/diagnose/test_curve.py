@@ -14,11 +14,11 @@ from hdsim.diagnose.penalised import penalised, roughness
 from hdsim.diagnose.screen import Residual
 from hdsim.effects.table import Table
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.freedom import state_of
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import Refit, refit
+from hdsim.estimate.state import state_of
 from hdsim.estimate.write import scenario_text
 from hdsim.scenario.model import Scenario
 

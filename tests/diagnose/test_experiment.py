@@ -14,10 +14,10 @@ from hdsim.effects import catalogue
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, fit
-from hdsim.estimate.freedom import Added, signed, state_of
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit
+from hdsim.estimate.state import Added, state_of
 from hdsim.scenario.model import Scenario
 
 NOISE = {"motor_angle": 1e-5, "output_angle": 4e-6, "motor_torque": 6e-3, "output_torque": 0.15}
@@ -60,7 +60,7 @@ def candidates(bench: Bench, base: Scenario, names: list[str]) -> dict[str, Fit]
     found = {}
     for name in names:
         way = catalogue()[name].fittings[0]
-        added = Added(name, way, (1.0,) * len(signed(way, 0)), tuple(s.starts[0] for s in way.shapes))
+        added = Added(name, way, (1.0,) * way.count(()), tuple(s.starts[0] for s in way.shapes))
         state = replace(fitted.state, added=(added,))
         found[name] = fit(bench, state, frees, prune=False, evaluations=6)
     return found

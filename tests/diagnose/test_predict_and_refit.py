@@ -11,12 +11,14 @@ from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting, Harmonic
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import base_intervals, fit, robust_covariance
-from hdsim.estimate.freedom import Added, Free, base_freedoms, state_of
+from hdsim.estimate.covariance import robust_covariance
+from hdsim.estimate.fit import base_intervals, fit
+from hdsim.estimate.numbers import Free, base_freedoms
 from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, tie, with_delays
 from hdsim.estimate.spline import smoothed
+from hdsim.estimate.state import Added, state_of
 from hdsim.estimate.suspect import delays
 from hdsim.estimate.write import fitted_numbers
 
@@ -236,10 +238,8 @@ def test_every_effect_can_be_built_from_its_fittings(name):
     kind = catalogue()[name]
     assert kind.fittings
     for fitting in kind.fittings:
-        from hdsim.estimate.freedom import signed
-
         orders = (2.0, 12.0)
-        count = len(signed(fitting, len(orders)))
+        count = fitting.count(orders)
         shapes = tuple(shape.starts[0] for shape in fitting.shapes)
         settings = Added(name, fitting, (1.0,) * count, shapes, orders).settings()
         kind(**settings)

@@ -10,10 +10,10 @@ from hdsim.diagnose import workflow
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import check_record
-from hdsim.estimate.freedom import state_of
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record, record_from
 from hdsim.estimate.refit import refit
+from hdsim.estimate.state import state_of
 from hdsim.estimate.suspect import suspicions
 
 TOTAL = 6.93e-5 + 0.50002 / 1e4

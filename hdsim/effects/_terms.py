@@ -1,0 +1,347 @@
+"""The terms of a fitting: fields of an effect in which its trace is, nearly, proportional to a coefficient.
+
+A term knows how many coefficients it has, within which bounds, how they are written into the effect's
+settings, and what a fit's result says of its fields.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+from hdsim.nested import at, copied, put
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: Coefficient below which a compliance in series counts as none.
+STIFF = 1e-6
+#: A fit stays this part of a limit inside, so that what it finds is a legal setting; and the part of a limit
+#: within which a number stands there: less than what one step of a finite difference moves it.
+INSIDE, LIMIT = 1e-3, 0.02
+
+#: Least and largest value of a field, by its path in the effect.
+Limits = Callable[[str], tuple[float, float]]
+Values = Sequence[float]
+Settings = dict[str, Any]
+
+
+class Ranged(NamedTuple):
+    """A fitted field with its 95 % interval; none where it is exact."""
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+Found = dict[str, Ranged]
+
+
+class Term:
+    """What the terms of a fitting have in common; the coefficients are the term's own."""
+
+    #: Field of the stiffness, where it is a compliance in series with the drive's spring.
+    series_field = ""
+    #: Whether it is the width of a play in series with it.
+    play = False
+    #: Name of the range that its units are parts of, if any.
+    of_range = ""
+    #: Path of the list that it adds items to, if any.
+    list_path = ""
+
+    def count(self, orders: Values) -> int:
+        """Number of coefficients.
+
+        Args:
+            orders: orders per wave-generator turn that were read from the data.
+        """
+        return 1
+
+    def may_be_negative(self) -> bool:
+        """Whether its coefficients have a sign."""
+        return False
+
+    def bounds(self, limits: Limits) -> tuple[float, float]:
+        """Least and largest value of each coefficient."""
+        return (-math.inf, math.inf) if self.may_be_negative() else (0.0, math.inf)
+
+    def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
+        """Write its fields into an effect's settings.
+
+        Args:
+            data: the settings.
+            c: its coefficients.
+            orders: orders of periodic terms.
+            before: what terms before it gave to each field; added to.
+        """
+        raise NotImplementedError
+
+    def at_end(self, c: Values, plausible: Limits) -> bool:
+        """Whether a field is as strong as its range allows: what is fitted would rather be something else."""
+        raise NotImplementedError
+
+    def rescaled(self, factor: float) -> Self:
+        """The same term with a unit that is worth ``factor`` times as much."""
+        raise NotImplementedError
+
+    def orders_among(self, lines: Iterable[tuple[str, float]], most: int) -> tuple[float, ...] | None:
+        """Orders that it reads from order spectra; None where it finds none and needs some.
+
+        Args:
+            lines: channel and order of each peak, the largest first.
+            most: number of orders.
+        """
+        return ()
+
+    def sized(self, ranges: Mapping[str, float]) -> Self:
+        """The term in units of its own, where they are parts of a range that the record covers."""
+        return self
+
+    def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
+        """Say what a fit found of its fields.
+
+        Args:
+            found: by path; added to.
+            c: its coefficients.
+            covariance: of them, scaled so that two standard deviations are a 95 % interval.
+            orders: orders of periodic terms.
+            items: number of items that its list has before.
+        """
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Amplitude(Term):
+    """Fields that grow in proportion to one coefficient.
+
+    Args:
+        units: field to its value at coefficient 1.
+        signed: the coefficient may be negative.
+        of_range: the units are parts of a range that the record covers: ``twist_arcmin``, if any.
+        play: the units are the width of a play in series with the drive's spring. Its trace beside the
+            spring's is the spring beyond the play: its size says how stiff that is, not how wide the play.
+    """
+
+    units: Mapping[str, float]
+    signed: bool = False
+    of_range: str = ""
+    play: bool = False
+
+    def may_be_negative(self) -> bool:
+        """As declared."""
+        return self.signed
+
+    def bounds(self, limits: Limits) -> tuple[float, float]:
+        """From the fields' own limits; where they bound both signs, a negative coefficient has one too."""
+        least, most = super().bounds(limits)
+        for path, unit in self.units.items():
+            low, high = limits(path)
+            most = min(most, (1.0 - INSIDE) * high / unit)
+            if self.signed:
+                least = max(least, (1.0 - INSIDE) * low / unit)
+        return least, most
+
+    def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
+        """Each field is its unit times the coefficient, on top of what the terms before gave it."""
+        for path, unit in self.units.items():
+            before[path] = before.get(path, 0.0) + c[0] * unit
+            put(data, path, before[path])
+
+    def at_end(self, c: Values, plausible: Limits) -> bool:
+        """At the upper end, or, of a signed one, at the lower."""
+        return any(_strongest(c[0] * unit, *plausible(path)) for path, unit in self.units.items())
+
+    def rescaled(self, factor: float) -> Self:
+        """Every unit times the factor."""
+        return replace(self, units={path: unit * factor for path, unit in self.units.items()})
+
+    def sized(self, ranges: Mapping[str, float]) -> Self:
+        """The parts times the range."""
+        return replace(self.rescaled(ranges[self.of_range]), of_range="") if self.of_range else self
+
+    def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
+        """Each field; one of several terms has their sum, with this one's spread."""
+        half = 2.0 * math.sqrt(max(float(covariance[0, 0]), 0.0))
+        for path, unit in self.units.items():
+            if path in found:
+                value = found[path].value + unit * c[0]
+                found[path] = Ranged(value, value - unit * half, value + unit * half)
+                continue
+            low = c[0] - half if self.signed else max(c[0] - half, 0.0)
+            found[path] = Ranged(unit * c[0], unit * low, unit * (c[0] + half))
+
+
+@dataclass(frozen=True)
+class Inverse(Term):
+    """A stiffness in series: the field is ``unit`` over the coefficient."""
+
+    path: str
+    unit: float
+
+    @property
+    def series_field(self) -> str:  # type: ignore[override]
+        """The stiffness."""
+        return self.path
+
+    def bounds(self, limits: Limits) -> tuple[float, float]:
+        """A stiffness at its lower limit is the largest compliance."""
+        low, high = limits(self.path)
+        most = (1.0 - INSIDE) * self.unit / low if low > 0 else math.inf
+        return self.unit / high if math.isfinite(high) else 0.0, most
+
+    def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
+        """A compliance of none is a very large stiffness."""
+        put(data, self.path, self.unit / max(c[0], STIFF))
+
+    def at_end(self, c: Values, plausible: Limits) -> bool:
+        """As soft as its range allows."""
+        low, _ = plausible(self.path)
+        return low > 0 and self.unit / max(c[0], STIFF) <= low * (1.0 + LIMIT)
+
+    def rescaled(self, factor: float) -> Self:
+        """A unit that is worth more is a softer spring."""
+        return replace(self, unit=self.unit / factor)
+
+    def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
+        """The stiffness; its interval is that of the compliance, inverted."""
+        half = 2.0 * math.sqrt(max(float(covariance[0, 0]), 0.0))
+        ends = c[0], c[0] + half, c[0] - half
+        found[self.path] = Ranged(*(self.unit / max(end, 1e-9) for end in ends))
+
+
+@dataclass(frozen=True)
+class Harmonic(Term):
+    """Amplitude and phase of sin(angle + phase): two coefficients, of the sine and of the cosine."""
+
+    amplitude: str
+    phase: str
+    unit: float
+
+    def count(self, orders: Values) -> int:
+        """Of the sine and of the cosine."""
+        return 2
+
+    def may_be_negative(self) -> bool:
+        """Both have a sign."""
+        return True
+
+    def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
+        """Amplitude and phase from the two coefficients."""
+        put(data, self.amplitude, self.unit * math.hypot(*c))
+        put(data, self.phase, math.degrees(math.atan2(c[1], c[0])))
+
+    def at_end(self, c: Values, plausible: Limits) -> bool:
+        """The amplitude at its upper end; a phase has none."""
+        return _strongest(self.unit * math.hypot(*c), *plausible(self.amplitude))
+
+    def rescaled(self, factor: float) -> Self:
+        """The unit times the factor."""
+        return replace(self, unit=self.unit * factor)
+
+    def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
+        """Amplitude along the vector of the coefficients, phase as wide as their ellipse is seen."""
+        import numpy as np
+
+        centre = np.array(c)
+        size = math.hypot(*c)
+        along = centre / max(size, 1e-12)
+        half = 2.0 * math.sqrt(max(float(along @ covariance @ along), 0.0))
+        ends = size, max(size - half, 0.0), size + half
+        found[self.amplitude] = Ranged(*(self.unit * end for end in ends))
+        angle, wide = math.degrees(math.atan2(c[1], c[0])), _seen_under(centre, covariance)
+        found[self.phase] = Ranged(angle, angle - wide, angle + wide)
+
+
+@dataclass(frozen=True)
+class Periodic(Term):
+    """Harmonics whose orders per wave-generator turn are read from the data; one list item each.
+
+    Args:
+        section: path of the list.
+        amplitude: field of an item that is its amplitude.
+        unit: its value at coefficient 1.
+        settings: further fields of an item.
+        channel: the channel whose order spectrum says which orders.
+        besides: orders that the fitting's other terms have; given, the term may find no other ones.
+    """
+
+    section: str
+    amplitude: str
+    unit: float
+    channel: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    besides: tuple[float, ...] = ()
+
+    def count(self, orders: Values) -> int:
+        """Two for each order."""
+        return 2 * len(orders)
+
+    def may_be_negative(self) -> bool:
+        """As those of a harmonic."""
+        return True
+
+    @property
+    def list_path(self) -> str:  # type: ignore[override]
+        """Its list."""
+        return self.section
+
+    def orders_among(self, lines: Iterable[tuple[str, float]], most: int) -> tuple[float, ...] | None:
+        """Of its channel, one a turn or more, but for those that other terms have."""
+        own = [order for channel, order in lines if channel == self.channel and order >= 1.0]
+        own = [order for order in own if not any(abs(order - other) < 0.05 for other in self.besides)]
+        return tuple(own[:most]) if own or self.besides else None
+
+    def harmonic(self, item: int) -> Harmonic:
+        """The harmonic that an item of the list is."""
+        path = f"{self.section}.{item}"
+        return Harmonic(f"{path}.{self.amplitude}", f"{path}.phase_deg", self.unit)
+
+    def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
+        """Append an item for each order."""
+        try:
+            items = copied(at(data, self.section))
+        except KeyError:
+            items = []
+        put(data, self.section, items)
+        for k, order in enumerate(orders):
+            items.append(dict(self.settings) | {"order": order})
+            self.harmonic(len(items) - 1).write(data, c[2 * k : 2 * k + 2], (), before)
+
+    def at_end(self, c: Values, plausible: Limits) -> bool:
+        """Any amplitude at its upper end."""
+        return any(self.harmonic(0).at_end(c[k : k + 2], plausible) for k in range(0, len(c), 2))
+
+    def rescaled(self, factor: float) -> Self:
+        """The unit times the factor."""
+        return replace(self, unit=self.unit * factor)
+
+    def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
+        """Order, amplitude and phase of each item."""
+        for k, order in enumerate(orders):
+            part = slice(2 * k, 2 * k + 2)
+            found[f"{self.section}.{items + k}.order"] = Ranged(order)
+            self.harmonic(items + k).report(found, c[part], covariance[part, part], (), items)
+
+
+def _strongest(value: float, low: float, high: float) -> bool:
+    """Whether a value stands at an end of its range away from zero."""
+    return value >= high / (1.0 + LIMIT) or (low < 0.0 and value <= low / (1.0 + LIMIT))
+
+
+def _seen_under(centre: Array, covariance: Array) -> float:
+    """Largest angle from a vector to its 95 % ellipse, degrees; 180 where that holds the origin."""
+    import numpy as np
+
+    values, vectors = np.linalg.eigh(covariance)
+    axes = 2.0 * np.sqrt(np.maximum(values, 0.0))
+    if np.sum((vectors.T @ centre / np.maximum(axes, 1e-300)) ** 2) <= 1.0:
+        return 180.0
+    turn = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    edge = centre[:, None] + vectors @ (axes[:, None] * np.array([np.cos(turn), np.sin(turn)]))
+    away = np.arctan2(centre[0] * edge[1] - centre[1] * edge[0], centre @ edge)
+    return float(np.degrees(np.max(np.abs(away))))

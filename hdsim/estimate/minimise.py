@@ -1,0 +1,106 @@
+"""The least-squares core: data weighed by the independent samples that they are worth, beside the priors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdsim.estimate.problem import Problem
+from hdsim.estimate.records import Array
+from hdsim.estimate.slopes import Slopes
+
+#: Evaluations of the residual in one round of a fit, Jacobians aside.
+EVALUATIONS = 8
+#: Relative fall of the cost at which a round of a fit ends; rounds, and promised fall, in units of what one
+#: independent sample adds to the cost, at which no further one begins.
+ROUGHLY, ROUNDS, TIGHT = 3e-4, 2, 0.25
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where a fit ends.
+
+    Attributes:
+        x: shape (p,).
+        rest: the residual there, shape (rows,).
+        columns: sensitivities there, shape (rows, p).
+    """
+
+    x: Array
+    rest: Array
+    columns: Array
+
+
+def minimised(
+    problem: Problem,
+    x0: Array,
+    centre: Array,
+    power: float,
+    *,
+    known: Array | None = None,
+    evaluations: int = EVALUATIONS,
+    rounds: int = ROUNDS,
+    rough: bool = False,
+) -> Minimum:
+    """Least squares of the residual and of what the priors have against the numbers.
+
+    Args:
+        problem: what is fitted.
+        x0: where to begin, within the bounds, shape (p,).
+        centre: of the priors, shape (p,).
+        power: what one independent sample of the residual counts.
+        known: sensitivities at the start to the first numbers, shape (rows, up to p), where known.
+        evaluations: residuals that the optimiser may ask for in a round.
+        rounds: most rounds, each with an exact Jacobian at its end.
+        rough: one round, whose last Jacobian is good enough.
+
+    Raises:
+        ArithmeticError: the residual at the start cannot be computed.
+    """
+    from scipy.optimize import least_squares
+
+    slopes = Slopes(problem, known)
+    start = problem.residual(x0)
+    slopes.rest[x0.tobytes()] = start
+    worth, priors = 1.0 / math.sqrt(power), problem.priors
+
+    def residual(x: Array) -> Array:
+        rest = slopes.rest.get(x.tobytes())
+        if rest is None:
+            try:
+                rest = slopes.rest[x.tobytes()] = problem.residual(x)
+            except ArithmeticError:
+                rest = 10.0 * start
+        return np.concatenate([worth * rest, (x - centre) / priors])
+
+    def jacobian(x: Array) -> Array:
+        return np.vstack([-worth * slopes.at(x), np.diag(1.0 / priors)])
+
+    for _ in range(1 if rough else rounds):
+        found = least_squares(
+            residual,
+            x0,
+            jac=jacobian,
+            bounds=problem.bounds,
+            method="trf",
+            x_scale="jac",
+            ftol=ROUGHLY,
+            xtol=1e-4,
+            gtol=1e-10,
+            max_nfev=evaluations,
+        )
+        if rough:
+            columns = slopes.at(found.x)
+            break
+        # The end is where the exact Jacobian promises less than an independent sample of the data is worth.
+        columns = slopes.proved(found.x)
+        whole = jacobian(found.x)
+        free = found.active_mask == 0
+        step, *_ = np.linalg.lstsq(whole[:, free], -found.fun, rcond=None)
+        promised = np.sum(found.fun**2) - np.sum((found.fun + whole[:, free] @ step) ** 2)
+        if promised < TIGHT:
+            break
+        x0 = found.x
+    return Minimum(found.x, found.fun[: len(start)] / worth, columns)

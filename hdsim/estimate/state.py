@@ -1,0 +1,163 @@
+"""A model in the course of a fit: the scenario's, effects that were added, and how its log is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from hdsim import number
+from hdsim.effects import catalogue
+from hdsim.effects._fitting import Fitting
+from hdsim.effects.table import Table
+from hdsim.estimate.predict import LEAD_IN_S, Candidate, PredictionError
+from hdsim.estimate.records import Array
+from hdsim.nested import merge
+
+if TYPE_CHECKING:
+    from hdsim.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect with coefficients: a fitting, its terms' coefficients and its shapes' values.
+
+    Attributes:
+        effect: its name in the catalogue.
+        fitting: how it is fitted.
+        coefficients: one for each column of its terms.
+        shapes: one value for each of its shapes.
+        orders: orders per wave-generator turn of its periodic terms.
+    """
+
+    effect: str
+    fitting: Fitting
+    coefficients: tuple[float, ...]
+    shapes: tuple[float, ...] = ()
+    orders: tuple[float, ...] = ()
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether a number stands at the end of its range: what is fitted would rather be another effect.
+
+        The range is the fitting's, within what the field allows and what its sources have. A number of the
+        effect's strength has no lower end: it is weak there.
+        """
+        if any(
+            shape.at_end(value, self.plausible)
+            for shape, value in zip(self.fitting.shapes, self.shapes, strict=True)
+        ):
+            return True
+        return any(
+            term.at_end(self.coefficients[part], self.plausible)
+            for term, part in self.fitting.parts(self.orders)
+        )
+
+    def limits(self, path: str) -> tuple[float, float]:
+        """Least and largest value that a field of the effect allows."""
+        return number.limits(_metadata(self.effect, path))
+
+    def plausible(self, path: str) -> tuple[float, float]:
+        """Least and largest value of a field that its sources have."""
+        return number.plausible(_metadata(self.effect, path))
+
+    def settings(self) -> dict[str, Any]:
+        """Values of the effect's fields."""
+        return self.fitting.written(self.coefficients, self.shapes, self.orders)
+
+
+@cache
+def _metadata(effect: str, path: str) -> tuple[Any, ...]:
+    """What a field of an effect says of its values."""
+    from hdsim.scenario.fields import shape_of
+
+    shape = shape_of(catalogue()[effect])
+    for key in path.split("."):
+        child = shape.child(int(key) if key.isdigit() else key)
+        if child is None:
+            raise KeyError(f"{effect} has no {path}")
+        shape = child
+    return shape.metadata
+
+
+@dataclass(frozen=True)
+class State:
+    """A model in the course of a fit.
+
+    Attributes:
+        drive: the drive.
+        load: the load.
+        effects: settings of the effects of the base, by name.
+        added: effects that the diagnosis has added.
+        gain: sensitivity of the motor torque's reading.
+        seed: seed of the model.
+        delays: age of the torques' readings beside that of the motion's, s, by channel.
+    """
+
+    drive: Any
+    load: Any
+    effects: dict[str, Any]
+    added: tuple[Added, ...] = ()
+    gain: float = 1.0
+    seed: int = 0
+    delays: Mapping[str, float] = field(default_factory=dict)
+
+    def reading(self, channel: str, time: Array, values: Array, before: State | None = None) -> Array:
+        """What the log shows of a predicted channel.
+
+        Args:
+            channel: its name.
+            time: shape (n,), s.
+            values: the prediction, shape (n,); or the reading under the state ``before``.
+            before: a state that differs in gain and delays only.
+        """
+        delay, gain = self.delays.get(channel, 0.0), self.gain
+        if before is not None:
+            delay, gain = delay - before.delays.get(channel, 0.0), gain / before.gain
+        if delay:
+            from scipy.interpolate import CubicSpline
+
+            values = CubicSpline(time, values)(np.clip(time - delay, time[0], time[-1]))
+        return gain * values if channel == "motor_torque" else values
+
+    def candidate(self) -> Candidate:
+        """The model to predict with.
+
+        Raises:
+            PredictionError: a coefficient is outside its effect's bounds.
+        """
+        effects = dict(self.effects)
+        known = catalogue()
+        merged: dict[str, dict[str, Any]] = {}
+        for added in self.added:
+            merge(merged.setdefault(added.effect, {}), added.settings())
+        for name, settings in merged.items():
+            if name in effects:
+                settings = merge(effects[name].model_dump(exclude_none=True), settings)
+            try:
+                effects[name] = known[name](**settings)
+            except ValidationError as error:
+                raise PredictionError(str(error)) from None
+        for name, effect in effects.items():
+            if isinstance(effect, Table):
+                # A curve over time begins with the record, after the lead-in.
+                effects[name] = effect.delayed(LEAD_IN_S)
+        return Candidate(self.drive, effects, self.load, self.seed)
+
+
+def state_of(scenario: Scenario) -> State:
+    """The scenario's model before anything is fitted."""
+    return State(scenario.drive, scenario.load, scenario.effects.active(), (), 1.0, scenario.run.seed)
+
+
+def number_at(state: State, path: str) -> float | None:
+    """A number of a state by its dotted path in the scenario; None where it is not set."""
+    section, _, rest = path.partition(".")
+    here: Any = {"drive": state.drive, "load": state.load, "effects": state.effects}[section]
+    for key in rest.split("."):
+        here = here[key] if isinstance(here, dict) else getattr(here, key)
+    return float(here) if here is not None else None

@@ -1,0 +1,234 @@
+"""The free numbers of a model as one vector, and the measured series as a function of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.numbers import Free, scaled
+from hdsim.estimate.records import Array
+from hdsim.estimate.state import State
+
+#: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which
+#: the model is further from linear; change of the whitened predictions, root mean square, for which a smaller
+#: step will do, and the smallest part of the largest step; times the step that a coefficient may go for that.
+STEP, SMALL_STEP, CHANGE, LEAST_STEP, MOST_STEP = 1e-1, 3e-2, 0.3, 3e-3, 10.0
+#: Prior spreads of an effect's coefficients (in units of their terms) and of what a fit moves of its shapes.
+COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
+#: Farthest that a fit moves a shape from where it starts.
+SHAPE_REACH = 3.0
+
+
+@dataclass(frozen=True)
+class Vector:
+    """The free numbers as one vector: logarithms, then coefficients and shapes of effects.
+
+    Attributes:
+        base: the model.
+        frees: numbers of the base.
+        first: effects before this one are held fixed.
+        by_compliance: a stiffness moves by the part x of its compliance that it gives away, theta =
+            -log(1 - x): beside a compliance in series the model is linear in that, and not in theta.
+    """
+
+    base: State
+    frees: tuple[Free, ...]
+    first: int
+    by_compliance: bool = False
+
+    def _inverted(self) -> NDArray[np.bool_]:
+        return np.array([self.by_compliance and free.compliance for free in self.frees], dtype=bool)
+
+    def logarithms(self, x: Array) -> Array:
+        """Logarithms of the base's factors at ``x``, shape (f,)."""
+        own = x[: len(self.frees)]
+        inverted = self._inverted()
+        return np.where(inverted, -np.log1p(-np.where(inverted, own, 0.0)), own)
+
+    def _own(self, logarithms: Sequence[float]) -> list[float]:
+        """The base's part of ``x`` at logarithms of its factors."""
+        logs = np.array(logarithms, dtype=float)
+        return [float(v) for v in np.where(self._inverted(), -np.expm1(-logs), logs)]
+
+    def rates(self, x: Array) -> Array:
+        """Derivatives of the logarithms with respect to their part of ``x``, shape (f,)."""
+        return np.where(self._inverted(), np.exp(self.logarithms(x)), 1.0)
+
+    def start(self, theta: Mapping[str, float] | None = None) -> Array:
+        """Where a fit begins; ``theta`` replaces logarithms of the base's factors, by name."""
+        values = self._own([(theta or {}).get(free.name, 0.0) for free in self.frees])
+        for added in self.base.added[self.first :]:
+            values += added.coefficients
+            values += [s.number(v) for s, v in zip(added.fitting.shapes, added.shapes, strict=True)]
+        return np.array(values)
+
+    def centre(self, x0: Array) -> Array:
+        """Where the priors have their centres: shapes where the fit begins, coefficients at none."""
+        values = self._own([free.none for free in self.frees])
+        at = len(self.frees)
+        for added in self.base.added[self.first :]:
+            at += len(added.coefficients)
+            values += [0.0] * len(added.coefficients) + x0[at : at + len(added.shapes)].tolist()
+            at += len(added.shapes)
+        return np.array(values)
+
+    def state(self, x: Array) -> State:
+        """The model at ``x``."""
+        state = scaled(self.base, self.frees, self.logarithms(x).tolist())
+        at = len(self.frees)
+        effects = list(self.base.added[: self.first])
+        for added in self.base.added[self.first :]:
+            coefficients = tuple(float(v) for v in x[at : at + len(added.coefficients)])
+            at += len(coefficients)
+            moved = zip(added.fitting.shapes, x[at : at + len(added.shapes)], strict=True)
+            shapes = tuple(shape.value(float(v)) for shape, v in moved)
+            at += len(shapes)
+            effects.append(replace(added, coefficients=coefficients, shapes=shapes))
+        return replace(state, added=tuple(effects))
+
+    def priors(self) -> Array:
+        """Prior standard deviations, shape (p,)."""
+        spreads = [free.prior for free in self.frees]
+        for added in self.base.added[self.first :]:
+            spreads += [COEFFICIENT_PRIOR] * len(added.coefficients) + [SHAPE_PRIOR] * len(added.shapes)
+        return np.array(spreads)
+
+    def coefficients(self) -> NDArray[np.bool_]:
+        """Which numbers are coefficients of an effect, shape (p,)."""
+        kinds = [False] * len(self.frees)
+        for added in self.base.added[self.first :]:
+            kinds += [True] * len(added.coefficients) + [False] * len(added.shapes)
+        return np.array(kinds, dtype=bool)
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds, shape (p,) each."""
+        ends = [free.bounds for free in self.frees]
+        pairs = list(zip(self._own([e[0] for e in ends]), self._own([e[1] for e in ends]), strict=True))
+        for added in self.base.added[self.first :]:
+            pairs += added.fitting.bounds(added.limits, added.orders)
+            for shape, value in zip(added.fitting.shapes, added.shapes, strict=True):
+                (low, high), here = shape.bounds(added.limits), shape.number(value)
+                pairs.append((max(here - SHAPE_REACH, low), min(here + SHAPE_REACH, high)))
+        lower, upper = np.array(pairs, dtype=float).reshape(-1, 2).T
+        return lower, upper
+
+    def steps(self, x: Array) -> Array:
+        """Steps of finite differences at ``x``, shape (p,)."""
+        own = np.array([SMALL_STEP if free.compliance else STEP for free in self.frees])
+        steps = (own / self.rates(x)).tolist()
+        at = len(self.frees)
+        for added in self.base.added[self.first :]:
+            steps += [SMALL_STEP * max(1.0, abs(v)) for v in x[at : at + len(added.coefficients)]]
+            steps += [SMALL_STEP] * len(added.shapes)
+            at += len(added.coefficients) + len(added.shapes)
+        return np.array(steps)
+
+
+class Measured:
+    """A model's free numbers against the training data: the problem that a fit of a model solves.
+
+    Args:
+        bench: the measured series, weighed.
+        vector: the free numbers.
+        theta: where the logarithms of the base's factors start, by name; 0 by default.
+    """
+
+    def __init__(self, bench: Bench, vector: Vector, theta: Mapping[str, float] | None = None) -> None:
+        self.bench, self.vector = bench, vector
+        self.names = [free.name for free in vector.frees]
+        for added in vector.base.added[vector.first :]:
+            self.names += [f"{added.effect}, coefficient {k + 1}" for k in range(len(added.coefficients))]
+            self.names += [f"{added.effect}.{shape.path}" for shape in added.fitting.shapes]
+        lower, upper = self.bounds = vector.bounds()
+        # The start may stand at a bound, where an optimiser's interior does not begin.
+        self.start = np.clip(vector.start(theta), np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+        self.priors = vector.priors()
+        self.centre = vector.centre(self.start)
+        self.blocks = bench.stacked_blocks()
+        #: Predictions by the bytes of where they were made.
+        self.predictions: dict[bytes, list[Array]] = {}
+
+    def residual(self, x: Array) -> Array:
+        """Whitened, shape (rows,).
+
+        Raises:
+            PredictionError: the model could not be predicted.
+        """
+        return self.bench.stacked(self.bench.residuals(self.predicted(x)))
+
+    def predicted(self, x: Array) -> list[Array]:
+        """Predictions of the training records, made once."""
+        found = self.predictions.get(x.tobytes())
+        if found is None:
+            found = self.predictions[x.tobytes()] = self.bench.predict(self.vector.state(x))
+        return found
+
+    def steps(self, x: Array) -> Array:
+        """Of finite differences, shape (p,)."""
+        return self.vector.steps(x)
+
+    def changes(self, pairs: Sequence[tuple[Array, Array]]) -> list[Array | None]:
+        """Whitened change of the predictions from one place of each pair to the other, offsets removed."""
+        there = self.bench.predict_all([self.vector.state(x) for pair in pairs for x in pair])
+        return [
+            None if back is None or ahead is None else self.bench.trace(back, ahead)
+            for back, ahead in zip(there[::2], there[1::2], strict=True)
+        ]
+
+    def sensitivities(self, x: Array, first: int = 0, like: Array | None = None) -> Array:
+        """See ``sensitivities``."""
+        return sensitivities(
+            self.bench, self.vector, x, self.predictions.get(x.tobytes()), first=first, like=like
+        )
+
+
+def sensitivities(
+    bench: Bench,
+    vector: Vector,
+    x: Array,
+    predictions: list[Array] | None = None,
+    *,
+    first: int = 0,
+    like: Array | None = None,
+) -> Array:
+    """Derivatives of the whitened predictions, offsets removed, to the numbers from ``first`` on.
+
+    Args:
+        bench: the measured series.
+        vector: the numbers.
+        x: where.
+        predictions: what the model predicts there, if it is known.
+        first: index of the first number that is asked for.
+        like: sensitivities near ``x``, shape (rows, up to p): steps are then large enough for a change that
+            stands out from the solver's noise, and no larger.
+    """
+    here = vector.state(x)
+    if predictions is None:
+        predictions = bench.predict(here)
+    steps = vector.steps(x)
+    if like is not None:
+        size = np.sqrt(np.mean(like**2, axis=0))
+        # Effects are linear in their coefficients, so those may move further.
+        kinds = vector.coefficients()[: len(size)]
+        wanted = CHANGE / np.maximum(size * steps[: len(size)], 1e-300)
+        steps[: len(size)] *= np.clip(wanted, LEAST_STEP, np.where(kinds, MOST_STEP, 1.0))
+    steps = steps[first:]
+    states = []
+    for k, step in enumerate(steps, start=first):
+        shifted = x.copy()
+        shifted[k] += step
+        states.append(vector.state(shifted))
+    # How a channel is read needs no simulation.
+    read = [k < len(vector.frees) and vector.frees[k].reading for k in range(first, len(x))]
+    simulated = iter(bench.predict_all([s for s, only in zip(states, read, strict=True) if not only]))
+    rows = len(bench.stacked_blocks())
+    columns = np.zeros((rows, len(steps)))
+    for k, (state, only, step) in enumerate(zip(states, read, steps, strict=True)):
+        there = bench.reread(predictions, here, state) if only else next(simulated)
+        if there is not None:
+            columns[:, k] = bench.trace(predictions, there) / step
+    return columns
