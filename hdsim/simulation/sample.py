@@ -67,8 +67,8 @@ def sample(model: Model, times: Array, channels: Sequence[str], *, rtol: float =
     )
     if not found.success:
         raise RunFailed(told(model, found))
-    # A sample at a cut belongs to the span before it, as in the integration.
-    span = np.clip(np.searchsorted(spans, grid, side="left") - 1, 0, len(spans) - 2)
+    # What jumps at a time has jumped already.
+    span = np.clip(np.searchsorted(spans, grid, side="right") - 1, 0, len(spans) - 2)
     inside = 0.5 * (spans[span] + spans[span + 1])
     true = observer.values(asked, grid, found.y.T, inside)
     if np.max(np.abs(true["motor_velocity"])) > FASTEST:  # where it is prescribed, no state tells
