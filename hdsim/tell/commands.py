@@ -43,6 +43,7 @@ def diagnose(
     import hdsim
     from hdsim.diagnose.workflow import diagnose as run
     from hdsim.estimate.records import record_from
+    from hdsim.tell.findings import gather
     from hdsim.tell.save import save
     from hdsim.tell.staging import staged
     from hdsim.tell.terminal import Progress, show
@@ -61,8 +62,9 @@ def diagnose(
     with Progress() as tell:
         found = run(records, scenario, holdout=held, load=load, force=force, on_step=tell)
         tell("finding the next experiment, writing the report")
-        report = save(found, model, out)
-    show(found)
+        told = gather(found)
+        report = save(found, model, out, told)
+    show(told)
     click.echo(f"report   {report}")
     if found.verdict.scenario:
         click.echo(f"scenario {found.verdict.scenario}")

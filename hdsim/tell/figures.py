@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.estimate.prove import held_out_gap
 from hdsim.plot import style, units
-from hdsim.tell.wording import spoken, unit_of
+from hdsim.tell.words import UNKNOWN, spoken, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,10 +17,9 @@ if TYPE_CHECKING:
 
     from hdsim.diagnose.further import CurveFound
     from hdsim.diagnose.verdict import Verdict
-    from hdsim.diagnose.workflow import Diagnosis
-    from hdsim.estimate.bench import Series
     from hdsim.estimate.found import Gap
     from hdsim.estimate.records import Array, Mask
+    from hdsim.tell.findings import Compared, Findings
 
 #: Most points of a drawn line.
 POINTS = 3000
@@ -37,35 +35,28 @@ Bars = list[tuple[str, float, tuple[float, float] | None, str]]
 """Label, height, 95 % interval and colour of bars, SI units."""
 
 
-def gap_bars(diagnosis: Diagnosis) -> dict[str, Bars]:
+def gap_bars(found: Findings) -> dict[str, Bars]:
     """The held-out gap of each channel: before, after the re-fit, after each effect, and at the end."""
-    bench, verdict = diagnosis.bench, diagnosis.verdict
-    last = "with the curve" if verdict.curve is not None else "with the effect"
+    verdict = found.verdict
+    curve = verdict.verdict == "unknown" and verdict.curve is not None
+    many = len(verdict.effects)
+    last = "with the effect" if many < 2 else "with both effects" if many == 2 else f"with all {many} effects"
+    last = "with the curve" if curve else last
     # Where nothing is added, the re-fitted model is what comes out.
     own = REFIT if verdict.verdict in ("effect", "unknown") else AFTER
-    found: dict[str, Bars] = {}
+    bars: dict[str, Bars] = {}
     for channel, gap in verdict.gap.items():
-        found[channel] = [
+        bars[channel] = [
             ("model as given", gap.before, gap.intervals.get("before"), BEFORE),
             ("own numbers re-fitted", gap.refit, gap.intervals.get("refit"), own),
         ]
-    if len(verdict.effects) > 1:
-        last = (
-            "with both effects" if len(verdict.effects) == 2 else f"with all {len(verdict.effects)} effects"
-        )
-        for stage in diagnosis.stages:
-            state = stage.named.fit.state if stage.named is not None else None
-            if state is None or len(state.added) >= len(verdict.effects):
-                continue
-            residuals = bench.residuals(bench.predict(state, everything=True))
-            label = "with " + ", ".join(spoken(added.effect) for added in state.added)
-            for channel, bars in found.items():
-                value, interval = held_out_gap(bench, channel, residuals, np.random.default_rng(17))
-                bars.append((label, value, interval, STEP))
-    if verdict.verdict == "effect" or verdict.curve is not None:
-        for channel, gap in verdict.gap.items():
-            found[channel].append((last, gap.after, gap.intervals.get("after"), AFTER))
-    return found
+        for step in found.steps:
+            label = "with " + ", ".join(map(spoken, step.effects))
+            value, interval = step.gap[channel]
+            bars[channel].append((label, value, interval, STEP))
+        if verdict.verdict == "effect" or curve:
+            bars[channel].append((last, gap.after, gap.intervals.get("after"), AFTER))
+    return bars
 
 
 def gap_figure(verdict: Verdict, found: dict[str, Bars]) -> Figure | None:
@@ -88,15 +79,20 @@ def gap_figure(verdict: Verdict, found: dict[str, Bars]) -> Figure | None:
 
 def _gap_panel(axes: Axes, gap: Gap, bars: Bars) -> None:
     unit = unit_of(gap)
-    reach = max([*(b[1] for b in bars), *(b[2][1] for b in bars if b[2]), gap.noise]) or 1.0
+    ends = [*(b[1] for b in bars), *(b[2][1] for b in bars if b[2]), gap.noise]
+    reach = max((end for end in ends if np.isfinite(end)), default=0.0) or 1.0
     for k, (_, value, interval, colour) in enumerate(bars):
+        if not np.isfinite(value):
+            axes.text(0.03 * unit.factor * reach, k, UNKNOWN, va="center", fontsize=8.5)
+            continue
         low, high = interval or (value, value)
         spread = unit.factor * np.array([[max(value - low, 0.0)], [max(high - value, 0.0)]])
         axes.barh(k, unit.factor * value, 0.68, color=colour, xerr=spread, ecolor="#444444", capsize=2.5)
         share = f"{100 * value / gap.before:.0f} %" if gap.before > 0 else ""
         end = unit.factor * (max(value, high) + 0.03 * reach)
         axes.text(end, k, f"{unit.factor * value:.3g}  ({share})", va="center", fontsize=8.5)
-    axes.axvline(unit.factor * gap.noise, color=style.BLACK, linestyle="--", linewidth=1.1)
+    if np.isfinite(gap.noise):
+        axes.axvline(unit.factor * gap.noise, color=style.BLACK, linestyle="--", linewidth=1.1)
     axes.set_xlim(0, 1.45 * unit.factor * reach)
     axes.set_yticks(range(len(bars)), [bar[0] for bar in bars])
     axes.tick_params(axis="y", length=0)
@@ -104,62 +100,24 @@ def _gap_panel(axes: Axes, gap: Gap, bars: Bars) -> None:
     axes.set_xlabel(f"rms difference ({unit.name})")
 
 
-def shown_values(bench_series: Series, ideal: Array, values: Array) -> Array:
-    """Values as they are drawn: of the output's angle, less motor angle over ratio."""
-    return np.asarray(values - ideal if bench_series.channel == "output_angle" else values)
-
-
-def trace_figure(diagnosis: Diagnosis) -> Figure | None:
+def trace_figure(found: Findings) -> Figure | None:
     """A stretch of held-out data closely: measured, before and after, and beside it what is left."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    chosen = _proved(diagnosis)
+    chosen = _proved(found)
     if not chosen:
         return None
-    bench = diagnosis.bench
-    residuals = {stage: bench.residuals(diagnosis.predictions[stage]) for stage in ("before", "after")}
     with rc_context(style.STYLE):
         figure = Figure(figsize=(WIDTH, 0.5 + 2.0 * len(chosen)), layout="constrained")
         grid = figure.subplots(len(chosen), 2, squeeze=False, width_ratios=[1.15, 1])
         stretches: dict[int, slice] = {}
-        for (left, right), k in zip(grid, chosen, strict=True):
-            series = bench.series[k]
-            predictor = bench.predictors[series.record]
+        for (left, right), series in zip(grid, chosen, strict=True):
             if series.record not in stretches:
-                stretches[series.record] = worst_stretch(
-                    predictor.record.time,
-                    [
-                        np.where(
-                            bench.series[j].hold, residuals["before"][j] / (bench.series[j].noise or 1.0), 0.0
-                        )
-                        for j in chosen
-                        if bench.series[j].record == series.record
-                    ],
-                    series.hold,
-                )
-            rows = stretches[series.record]
-            time = predictor.record.time[rows]
-            good = (series.train | series.hold)[rows]
-            ideal = predictor.motor_angle[rows] / predictor.ratio
-            measured = shown_values(series, ideal, series.measured[rows])
-            measured = np.where(good, measured - (measured.mean() if _is_error(series) else 0.0), np.nan)
-            unit = _unit(series, measured)
-            left.plot(time, unit.factor * measured, color=MEASURED, linewidth=0.9, label="measured")
-            rest_unit = _unit(series, *(residuals[stage][k][rows] for stage in residuals))
-            for stage, colour in (("before", BEFORE), ("after", AFTER)):
-                rest = np.where(good, residuals[stage][k][rows], np.nan)
-                left.plot(
-                    time, unit.factor * (measured - rest), color=colour, linewidth=1.2, label=f"model {stage}"
-                )
-                right.plot(time, rest_unit.factor * rest, color=colour, linewidth=0.9, label=stage)
-            right.axhspan(
-                *(s * rest_unit.factor * series.noise for s in (-2, 2)),
-                color="#BBBBBB", alpha=0.45, zorder=0, linewidth=0, label="noise (95 %)",
-            )  # fmt: skip
-            name = "transmission error" if _is_error(series) else spoken(series.channel)
-            left.set_title(f"{name} ({unit.name})")
-            right.set_title(f"measured less model ({rest_unit.name})")
+                own = [other for other in chosen if other.record == series.record]
+                off = [np.where(s.hold, s.left["before"] / (s.noise or 1.0), 0.0) for s in own]
+                stretches[series.record] = worst_stretch(series.time, off, series.hold)
+            _closely(left, right, series, stretches[series.record])
         handles, labels = grid[0, 0].get_legend_handles_labels()
         band = grid[0, 1].get_legend_handles_labels()
         figure.legend(
@@ -170,27 +128,47 @@ def trace_figure(diagnosis: Diagnosis) -> Figure | None:
     return figure
 
 
-def whole_figure(diagnosis: Diagnosis) -> Figure | None:
+def _closely(left: Axes, right: Axes, series: Compared, rows: slice) -> None:
+    """Measured and models over a stretch, and beside it what is left of both with the noise."""
+    time, good = series.time[rows], (series.train | series.hold)[rows]
+    measured = series.measured[rows]
+    if _is_error(series):
+        measured = measured - series.ideal[rows]
+        measured = measured - measured.mean()
+    measured = np.where(good, measured, np.nan)
+    unit = _unit(series, measured)
+    left.plot(time, unit.factor * measured, color=MEASURED, linewidth=0.9, label="measured")
+    rest_unit = _unit(series, *(series.left[stage][rows] for stage in ("before", "after")))
+    for stage, colour in (("before", BEFORE), ("after", AFTER)):
+        rest = np.where(good, series.left[stage][rows], np.nan)
+        left.plot(time, unit.factor * (measured - rest), color=colour, linewidth=1.2, label=f"model {stage}")
+        right.plot(time, rest_unit.factor * rest, color=colour, linewidth=0.9, label=stage)
+    right.axhspan(
+        *(s * rest_unit.factor * series.noise for s in (-2, 2)),
+        color="#BBBBBB", alpha=0.45, zorder=0, linewidth=0, label="noise (95 %)",
+    )  # fmt: skip
+    name = "transmission error" if _is_error(series) else spoken(series.channel)
+    left.set_title(f"{name} ({unit.name})")
+    right.set_title(f"measured less model ({rest_unit.name})")
+
+
+def whole_figure(found: Findings) -> Figure | None:
     """What is left of each channel over the whole record, the stretches that no fit has seen shaded."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    chosen = _proved(diagnosis)
+    chosen = _proved(found)
     if not chosen:
         return None
-    bench = diagnosis.bench
-    residuals = {stage: bench.residuals(diagnosis.predictions[stage]) for stage in ("before", "after")}
     with rc_context(style.STYLE):
         figure = Figure(figsize=(WIDTH, 0.6 + 1.35 * len(chosen)), layout="constrained")
         grid = figure.subplots(len(chosen), 1, squeeze=False)[:, 0]
-        for axes, k in zip(grid, chosen, strict=True):
-            series = bench.series[k]
-            time = bench.predictors[series.record].record.time
-            good = series.train | series.hold
+        for axes, series in zip(grid, chosen, strict=True):
+            time, good = series.time, series.train | series.hold
             thin = max(1, len(time) // POINTS)
-            unit = _unit(series, *(residuals[stage][k][good] for stage in residuals))
+            unit = _unit(series, *(series.left[stage][good] for stage in ("before", "after")))
             for stage, colour in (("before", BEFORE), ("after", AFTER)):
-                rest = np.where(good, unit.factor * residuals[stage][k], np.nan)
+                rest = np.where(good, unit.factor * series.left[stage], np.nan)
                 axes.plot(time[::thin], rest[::thin], color=colour, linewidth=0.7, label=stage)
             for a, b in _runs(series.hold):
                 axes.axvspan(time[a], time[b - 1], color="#EFEFEF", zorder=0)
@@ -201,22 +179,20 @@ def whole_figure(diagnosis: Diagnosis) -> Figure | None:
     return figure
 
 
-def _proved(diagnosis: Diagnosis) -> list[int]:
+def _proved(found: Findings) -> list[Compared]:
     """One series with held-out samples of each channel."""
-    if not diagnosis.predictions:
-        return []
-    chosen: dict[str, int] = {}
-    for k, series in enumerate(diagnosis.bench.series):
+    chosen: dict[str, Compared] = {}
+    for series in found.series:
         if series.hold.any():
-            chosen.setdefault(series.channel, k)
+            chosen.setdefault(series.channel, series)
     return list(chosen.values())
 
 
-def _is_error(series: Series) -> bool:
+def _is_error(series: Compared) -> bool:
     return series.channel == "output_angle"
 
 
-def _unit(series: Series, *curves: Array) -> units.Unit:
+def _unit(series: Compared, *curves: Array) -> units.Unit:
     size = units.largest(*curves)
     return units.for_error(size) if series.channel.endswith("angle") else units.for_torque(size)
 

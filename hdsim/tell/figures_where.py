@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.diagnose.locate import coordinates, order_lines
 from hdsim.plot import style, units
 from hdsim.tell.figures import AFTER, BEFORE, POINTS, REFIT, WIDTH
-from hdsim.tell.wording import spoken
+from hdsim.tell.words import spoken
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,10 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.locate import Line, Place
-    from hdsim.diagnose.workflow import Diagnosis
-    from hdsim.estimate.bench import Bench
+    from hdsim.diagnose.evidence import PlaceEvidence
+    from hdsim.diagnose.locate import Line
     from hdsim.estimate.records import Array
+    from hdsim.tell.findings import Compared, Findings
 
 #: Least share of a place that is drawn, most bars, and most panels beside them.
 LEAST, MOST_BARS, MOST_PANELS = 0.02, 8, 3
@@ -52,20 +51,15 @@ LABELS = {
 }
 
 
-def located_figure(diagnosis: Diagnosis) -> Figure | None:
+def located_figure(found: Findings) -> Figure | None:
     """Shares of the re-fitted model's residual by coordinate, curves over the best, and order spectra."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    bench = diagnosis.bench
-    shown = _distinct(diagnosis.stages[0].location.places)
-    if not shown or not diagnosis.predictions:
+    shown = _distinct(found.places)
+    if not shown or not found.series:
         return None
-    rest = {stage: bench.residuals(diagnosis.predictions[stage]) for stage in ("refit", "after")}
-    panels = _panels(shown)
-    spectra = [p for p in panels if p.coordinate == "wave_generator_angle"]
-    lines = {p.channel: order_lines(bench, rest["refit"], p.channel) for p in spectra}
-    panels = [p for p in panels if p not in spectra or lines[p.channel]]
+    panels = [p for p in _panels(shown) if _drawable(found, p)]
     with rc_context(style.STYLE):
         rows = (len(panels) + 2) // 2
         figure = Figure(figsize=(WIDTH, 2.75 * rows), layout="constrained")
@@ -78,19 +72,34 @@ def located_figure(diagnosis: Diagnosis) -> Figure | None:
         )
         axes_of = [figure.add_subplot(place) for place in places]
         _shares(axes_of[0], shown[:MOST_BARS], room=10 if len(panels) == 2 else 5)
-        changed = diagnosis.verdict.verdict == "effect" or diagnosis.verdict.curve is not None
+        verdict = found.verdict
+        changed = verdict.verdict == "effect" or verdict.curve is not None
         for axes, place in zip(axes_of[1:], panels, strict=True):
             if place.coordinate == "wave_generator_angle":
-                _spectrum(axes, bench, rest, lines[place.channel], place, after=changed)
+                _spectrum(axes, found, place, after=changed)
             elif place.coordinate == "frequency":
-                _ringing(axes, bench, rest, place, after=changed)
+                _ringing(axes, found, place, after=changed)
             else:
-                _over(axes, bench, rest, place, after=changed)
-        axes_of[1].legend(loc="best", frameon=True, framealpha=0.8, edgecolor="none")
+                _over(axes, found, place, after=changed)
+        if panels:
+            axes_of[1].legend(loc="best", frameon=True, framealpha=0.8, edgecolor="none")
     return figure
 
 
-def _panels(shown: Sequence[Place]) -> list[Place]:
+def _first(found: Findings, channel: str) -> Compared:
+    """The first series of a channel, which has the coordinates."""
+    return next(series for series in found.series if series.channel == channel)
+
+
+def _drawable(found: Findings, place: PlaceEvidence) -> bool:
+    if place.channel not in found.channels:
+        return False
+    if place.coordinate == "wave_generator_angle":
+        return bool(found.lines.get(place.channel))
+    return place.coordinate == "frequency" or place.coordinate in _first(found, place.channel).over
+
+
+def _panels(shown: Sequence[PlaceEvidence]) -> list[PlaceEvidence]:
     """Places that get a picture: the best of each channel first, then further quantities."""
     telling = [p for p in shown if p.share >= NEAR * shown[0].share and p.coordinate in LABELS]
     if any(place.coordinate == "velocity" for place in telling):
@@ -106,16 +115,16 @@ def _panels(shown: Sequence[Place]) -> list[Place]:
     return sorted(chosen[:MOST_PANELS], key=lambda place: -place.share)
 
 
-def _distinct(places: Sequence[Place]) -> list[Place]:
+def _distinct(places: Sequence[PlaceEvidence]) -> list[PlaceEvidence]:
     """The best entry of each coordinate and channel that is worth a bar, by falling share."""
-    found: dict[tuple[str, str], Place] = {}
+    found: dict[tuple[str, str], PlaceEvidence] = {}
     for place in places:
         if place.share >= LEAST:
             found.setdefault((place.coordinate, place.channel), place)
     return list(found.values())
 
 
-def _shares(axes: Axes, places: Sequence[Place], room: int) -> None:
+def _shares(axes: Axes, places: Sequence[PlaceEvidence], room: int) -> None:
     for k, place in enumerate(places):
         axes.barh(k, 100 * place.share, 0.68, color=REFIT)
         axes.text(100 * place.share + 1.5, k, f"{100 * place.share:.0f} %", va="center", fontsize=8.5)
@@ -133,16 +142,14 @@ def _shares(axes: Axes, places: Sequence[Place], room: int) -> None:
     axes.set_ylim(max(len(places), room) - 0.4, -0.6)
 
 
-def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, *, after: bool) -> None:
+def _over(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) -> None:
     """The residual over a coordinate: points, and the mean over bins before and after."""
-    index = next(k for k, s in enumerate(bench.series) if s.channel == place.channel)
-    series = bench.series[index]
-    where = coordinates(bench, series, rest["refit"])
+    series = _first(found, place.channel)
     used = np.flatnonzero(series.train)
-    values = {stage: residuals[index][used] for stage, residuals in rest.items()}
+    values = {stage: rest[used] for stage, rest in series.left.items()}
     low, high = np.quantile(values["refit"], [0.01, 0.99])
     unit = _unit(place.channel, max(abs(low), abs(high)))
-    x = where[place.coordinate][used]
+    x = series.over[place.coordinate][used]
     label, name = LABELS.get(place.coordinate, (spoken(place.coordinate), ""))
     if name == "rad":
         across = units.for_angle(float(np.max(np.abs(x))))
@@ -151,7 +158,7 @@ def _over(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, 
     axes.plot(
         x[::thin], unit.factor * values["refit"][::thin], ".", markersize=2, color="#9A9A9A", alpha=0.45
     )
-    turned = where["direction"][used]
+    turned = series.over["direction"][used]
     if place.coordinate in _LOOPS and len(np.unique(turned)) > 1:
         _mean(axes, x[turned > 0], unit.factor * values["refit"][turned > 0], BEFORE, "left, forwards", "-")
         _mean(axes, x[turned < 0], unit.factor * values["refit"][turned < 0], BEFORE, "left, backwards", "--")
@@ -190,35 +197,32 @@ def _mean(axes: Axes, x: Array, values: Array, colour: str, label: str, line: st
     axes.plot(at, mean, line, color=colour, linewidth=1.8, label=label)
 
 
-def _spectrum(
-    axes: Axes, bench: Bench, rest: dict[str, list[Array]], lines: list[Line], place: Place, *, after: bool
-) -> None:
+def _spectrum(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) -> None:
     """Amplitude over order per wave-generator turn, by least squares over the measured angle."""
-    own = [k for k, s in enumerate(bench.series) if s.channel == place.channel and s.train.any()]
+    own = [s for s in found.series if s.channel == place.channel and s.train.any()]
+    lines = found.lines[place.channel]
     highest = max(5.0, 1.15 * max(line.order for line in lines))
     orders = np.unique(
         np.concatenate([np.linspace(0.5, highest, SPECTRUM_ORDERS), [line.order for line in lines]])
     )
-    angle = np.concatenate(
-        [bench.predictors[bench.series[k].record].motor_angle[bench.series[k].train] for k in own]
-    )
+    angle = np.concatenate([series.motor_angle[series.train] for series in own])
     part = np.arange(len(angle))
     if len(part) > SPECTRUM_SAMPLES:
         part = np.random.default_rng(0).choice(len(part), SPECTRUM_SAMPLES, replace=False)
     waves = np.exp(-1j * np.outer(orders, angle[part]))
-    found = {}
-    for stage, residuals in rest.items():
-        values = np.concatenate([residuals[k][bench.series[k].train] for k in own])[part]
-        found[stage] = 2.0 * np.abs(waves @ (values - values.mean())) / len(part)
-    unit = _unit(place.channel, float(found["refit"].max()))
+    sizes = {}
+    for stage in ("refit", "after"):
+        values = np.concatenate([series.left[stage][series.train] for series in own])[part]
+        sizes[stage] = 2.0 * np.abs(waves @ (values - values.mean())) / len(part)
+    unit = _unit(place.channel, float(sizes["refit"].max()))
     axes.plot(
-        orders, unit.factor * found["refit"], color=BEFORE, linewidth=1.1, label="left by the re-fitted model"
+        orders, unit.factor * sizes["refit"], color=BEFORE, linewidth=1.1, label="left by the re-fitted model"
     )
     if after:
-        axes.plot(orders, unit.factor * found["after"], color=AFTER, linewidth=1.1, label="left after")
-    top = unit.factor * float(found["refit"].max())
-    for at, text in _peaks(lines, highest, bench):
-        height = unit.factor * float(np.interp(at, orders, found["refit"]))
+        axes.plot(orders, unit.factor * sizes["after"], color=AFTER, linewidth=1.1, label="left after")
+    top = unit.factor * float(sizes["refit"].max())
+    for at, text in _peaks(found, lines, highest, own[0].ratio):
+        height = unit.factor * float(np.interp(at, orders, sizes["refit"]))
         axes.annotate(text, (at, height), (0, 3), textcoords="offset points", ha="center", fontsize=8.5,
                       fontweight="bold")  # fmt: skip
     axes.set_xlim(0, highest)
@@ -228,18 +232,16 @@ def _spectrum(
     axes.set_title(f"{spoken(place.channel)}: {100 * place.share:.0f} % over orders")
 
 
-def _ringing(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Place, *, after: bool) -> None:
+def _ringing(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) -> None:
     """Amplitude density over frequency (Welch's method), its highest peak labelled."""
     from scipy.signal import welch
 
-    index = next(k for k, s in enumerate(bench.series) if s.channel == place.channel)
-    series = bench.series[index]
-    record = bench.predictors[series.record].record
-    rate = 1.0 / record.period_s
+    series = _first(found, place.channel)
+    rate = 1.0 / series.period_s
     good = series.train | series.hold
     densities = {}
-    for stage, residuals in rest.items():
-        values = np.where(good, residuals[index], 0.0)
+    for stage, rest in series.left.items():
+        values = np.where(good, rest, 0.0)
         length = min(len(values), max(256, int(SPECTRUM_S * rate)))
         frequency, power = welch(values, rate, nperseg=length)
         densities[stage] = np.sqrt(power[1:])
@@ -258,31 +260,31 @@ def _ringing(axes: Axes, bench: Bench, rest: dict[str, list[Array]], place: Plac
     axes.set_title(f"{spoken(place.channel)}: {100 * place.share:.0f} % over frequency")
 
 
-def _peaks(lines: Sequence[Line], span: float, bench: Bench) -> list[tuple[float, str]]:
+def _peaks(found: Findings, lines: Sequence[Line], span: float, ratio: float) -> list[tuple[float, str]]:
     """Where labels stand and what they say; those of neighbours are joined.
 
     A line that these turns cannot tell from another order of the drive bears both names: errors of the fixed
     member come at 2 and 4, those of the turning one at 2 and 4 less 2 and 4 over the ratio.
     """
-    relative = 1.0 - 1.0 / bench.predictors[0].ratio
+    relative = 1.0 - 1.0 / ratio
     known = (2.0, 2.0 * relative, 4.0, 4.0 * relative)
 
     def name(line: Line) -> str:
-        near = [order for order in known if abs(order - line.order) < 0.7 / bench.turns]
+        near = [order for order in known if abs(order - line.order) < 0.7 / max(found.turns, 1e-9)]
         return "/".join(f"{order:.4g}" for order in near) if len(near) > 1 else f"{line.order:.4g}"
 
-    found: list[list[Line]] = []
+    groups: list[list[Line]] = []
     for line in sorted(lines, key=lambda line: line.order):
-        if found and line.order - found[-1][-1].order < 0.07 * span:
-            found[-1].append(line)
+        if groups and line.order - groups[-1][-1].order < 0.07 * span:
+            groups[-1].append(line)
         else:
-            found.append([line])
+            groups.append([line])
     return [
         (
             max(group, key=lambda line: line.amplitude).order,
             " · ".join(dict.fromkeys(name(line) for line in group)),
         )
-        for group in found
+        for group in groups
     ]
 
 

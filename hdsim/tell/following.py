@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from hdsim.diagnose.experiment import propose
 from hdsim.errors import InputError
-from hdsim.tell.wording import title_of
+from hdsim.tell.words import title_of
 
 if TYPE_CHECKING:
     from hdsim.diagnose.workflow import Diagnosis
     from hdsim.estimate.fit import Fit
 
-#: Share of resampled records below which a name is weak: then it is held against the model without it.
+#: Probability to be right below which a name is weak: then it is held against the model without it.
 WEAK = 0.8
 #: What the model without an effect is called in a sentence.
 NOTHING = "nothing more"
@@ -33,7 +33,7 @@ def candidates(diagnosis: Diagnosis) -> dict[str, Fit]:
         if others:
             return {one.name: one.fit, **others}
     last = diagnosis.named[-1]
-    if last.confidence < WEAK and len(diagnosis.named) == 1:
+    if diagnosis.verdict.effects[-1].confidence < WEAK and len(diagnosis.named) == 1:
         return {last.name: last.fit, NOTHING: diagnosis.refit.fit}
     return {}
 

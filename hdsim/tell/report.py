@@ -9,27 +9,18 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hdsim.diagnose.name import LEAST_SHARE, LEVEL
-from hdsim.diagnose.verdict import Verdict
-from hdsim.tell import figures
+from hdsim.tell import figures, sections
 from hdsim.tell.figures_where import located_figure
-from hdsim.tell.tables import GAP_HEAD, gap_rows, numbers_table, table
-from hdsim.tell.wording import (
-    KINDS,
-    gains,
-    headline,
-    meaning,
-    percent,
-    shown,
-    spoken,
-    sureness,
-    titles_of,
-)
+from hdsim.tell.findings import Findings
+from hdsim.tell.tables import GAP_HEAD, gap_rows, section, table
+from hdsim.tell.why import why
+from hdsim.tell.wording import KINDS, gains, headline, meaning, sureness
+from hdsim.tell.words import short, spoken
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.diagnose.verdict import Verdict
 
 #: Dots an inch of the figures: sharp on screens with small pixels.
 DPI = 160
@@ -59,16 +50,16 @@ _ALTS = {
 }
 
 
-def write_report(diagnosis: Diagnosis, out: Path) -> Path:
+def write_report(found: Findings, out: Path) -> Path:
     """Write ``report.html`` and its figures into a directory; returns the report's path."""
     pictures: dict[str, Figure | None] = {
-        "gap": figures.gap_figure(diagnosis.verdict, figures.gap_bars(diagnosis)),
-        "located": located_figure(diagnosis),
-        "traces": figures.trace_figure(diagnosis),
-        "whole": figures.whole_figure(diagnosis),
+        "gap": figures.gap_figure(found.verdict, figures.gap_bars(found)),
+        "located": located_figure(found),
+        "traces": figures.trace_figure(found),
+        "whole": figures.whole_figure(found),
     }
-    if diagnosis.verdict.curve is not None:
-        pictures["curve"] = figures.curve_figure(diagnosis.verdict.curve)
+    if found.verdict.curve is not None:
+        pictures["curve"] = figures.curve_figure(found.verdict.curve)
     embedded = {}
     for name, figure in pictures.items():
         if figure is not None:
@@ -77,7 +68,7 @@ def write_report(diagnosis: Diagnosis, out: Path) -> Path:
             (out / f"{name}.png").write_bytes(stream.getvalue())
             embedded[name] = _figure(name, stream.getvalue())
     path = out / "report.html"
-    path.write_text(_page(diagnosis, embedded), encoding="utf-8")
+    path.write_text(_page(found, embedded), encoding="utf-8")
     return path
 
 
@@ -89,65 +80,66 @@ def _figure(name: str, content: bytes) -> str:
     )
 
 
-def _page(diagnosis: Diagnosis, pictures: dict[str, str]) -> str:
-    verdict = diagnosis.verdict
-    css = files("hdsim.diagnose").joinpath("page.css").read_text(encoding="utf-8")
+def _page(found: Findings, pictures: dict[str, str]) -> str:
+    verdict = found.verdict
+    css = files("hdsim.tell").joinpath("page.css").read_text(encoding="utf-8")
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",
         f"<meta name='description' content='{html.escape(verdict.sentence)}'>",
         f"<title>{KINDS[verdict.verdict]}: hdsim diagnose</title>",
         f"<style>{css}:root{{--kind:var(--{verdict.verdict})}}</style></head><body><main>",
-        _origin(diagnosis),
-        _head(diagnosis),
-        _section(
+        _origin(found),
+        _head(found),
+        section(
             "How far off the model is, before and after",
-            pictures.get("gap", "")
-            + "<details><summary>the same as numbers</summary>"
-            + table(GAP_HEAD, gap_rows(verdict), range(2, len(GAP_HEAD)))
-            + "</details>",
+            pictures.get("gap", "<p>No data were held out, so there is no gap to show.</p>")
+            + (_as_numbers(verdict) if verdict.gap else ""),
         ),
-        _confusions(verdict),
-        _next(verdict),
-        _curve(verdict, pictures),
-        _section(
+        why(found),
+        sections.confusions(verdict),
+        sections.following(verdict),
+        sections.curve(found, pictures.get("curve", "")),
+        section(
             "Where the difference lives",
             pictures.get(
                 "located", "<p>What the re-fitted model leaves is a function of nothing measured.</p>"
             ),
         ),
-        _section(
-            "Measured, and the model before and after", pictures.get("traces", "") + pictures.get("whole", "")
-        ),
-        _fitted(diagnosis),
-        _data(verdict),
-        _not_tried(verdict),
-        _method(diagnosis),
-        _files(verdict, pictures),
+        _over_time(pictures),
+        sections.fitted(found),
+        sections.data(verdict),
+        sections.not_tried(verdict),
+        sections.method(found),
+        sections.written(verdict, pictures),
     ]
     return "\n".join(part for part in [*parts, "</main></body></html>"] if part)
 
 
-def _section(title: str, body: str, kind: str = "") -> str:
-    return f"<section{f' class={kind}' if kind else ''}><h2>{html.escape(title)}</h2>{body}</section>"
+def _as_numbers(verdict: Verdict) -> str:
+    rows = table(GAP_HEAD, gap_rows(verdict), range(2, len(GAP_HEAD)))
+    return f"<details><summary>the same as numbers</summary>{rows}</details>"
 
 
-def _origin(diagnosis: Diagnosis) -> str:
-    bench = diagnosis.bench
-    names = []
-    for k, predictor in enumerate(bench.predictors):
-        record = predictor.record
-        held = ", held out" if k >= bench.training else ""
-        names.append(f"{record.name} ({record.duration_s:.3g} s at {1 / record.period_s:.4g} Hz{held})")
-    channels = ", ".join(spoken(channel) for channel in bench.channels)
+def _over_time(pictures: dict[str, str]) -> str:
+    body = pictures.get("traces", "") + pictures.get("whole", "")
+    return section("Measured, and the model before and after", body) if body else ""
+
+
+def _origin(found: Findings) -> str:
+    names = [
+        f"{run.name} ({short(run.duration_s)} s at {short(1 / run.period_s, 4)} Hz{', held out' * run.held})"
+        for run in found.runs
+    ]
+    channels = ", ".join(map(spoken, found.channels))
     text = f"hdsim diagnose: {', '.join(names)}. Predicted from the measured motion and compared: {channels}."
-    return f"<p class='origin'>{html.escape(text)}</p>"
+    return f"<p class='origin'>{html.escape(text)}</p>" if found.runs else ""
 
 
-def _head(diagnosis: Diagnosis) -> str:
-    verdict = diagnosis.verdict
-    sure = sureness(diagnosis)
-    said = headline(verdict)
+def _head(found: Findings) -> str:
+    verdict = found.verdict
+    sure = sureness(found)
+    said = headline(found)
     long = " class='long'" if len(said) > LONG else ""
     listed = "".join(f"<li>{html.escape(line)}</li>" for line in gains(verdict))
     unseen = "Gap on data that no fit has seen:" if verdict.gap else "No data were held out."
@@ -158,7 +150,7 @@ def _head(diagnosis: Diagnosis) -> str:
         f"class='number'>{html.escape(sure.number)}</span></p>"
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)
         + f"</div><div><h2>What it "
-        f"means</h2><p>{html.escape(meaning(verdict))}</p>{_pointers(verdict)}</div><div><h2>What it "
+        f"means</h2><p>{html.escape(meaning(found))}</p>{_pointers(verdict)}</div><div><h2>What it "
         f"gains</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
     )
 
@@ -175,159 +167,3 @@ def _pointers(verdict: Verdict) -> str:
     if verdict.curve is not None:
         said.append("<a href='#curve'>the curve</a>")
     return f"<p>See also: {', '.join(said)}.</p>" if said else ""
-
-
-def _confusions(verdict: Verdict) -> str:
-    body = ""
-    for effect in verdict.effects:
-        if not effect.indistinguishable_from:
-            continue
-        own, *others = titles_of(effect)
-        lines = ""
-        for name, title in zip(effect.indistinguishable_from, others, strict=True):
-            rule = effect.separated_by.get(name) or "no rule is recorded"
-            lines += f"<li><b>{html.escape(title)}</b>. What separates the two: {html.escape(rule)}.</li>"
-        body += f"<p>These data cannot tell <b>{html.escape(own)}</b> from:</p><ul>{lines}</ul>"
-    if verdict.suspects:
-        listed = ", ".join(f"{spoken(name)} ({percent(share)})" for name, share in verdict.suspects.items())
-        body += f"<p>Effects that explain a part, not enough to be named: {html.escape(listed)}.</p>"
-    return _section("Could be confused", body, "warn") if body else ""
-
-
-def _next(verdict: Verdict) -> str:
-    proposal = verdict.next_experiment
-    if proposal is None:
-        return ""
-    rows = [
-        [c.title, _short(c.separation), f"{_short(c.relative)} ×" if c.relative else "-"]
-        for c in proposal.considered[:8]
-    ]
-    body = f"<p><b>{html.escape(proposal.sentence)}</b></p>"
-    if proposal.scenario:
-        body += (
-            f"<p>It is ready as a scenario: <code>{html.escape(Path(proposal.scenario).name)}</code>; "
-            f"<code>hdsim run {html.escape(proposal.scenario)}</code> shows what the model expects.</p>"
-        )
-    body += (
-        "<p class='note'>d′ is the distance between the two candidates that are hardest to tell apart, in "
-        "standard deviations of the noise, after each has been fitted to the other as well as it can be: 1 "
-        "is a guess that is right in 69 % of cases, 3 in 93 %, more is safe. Here "
-        f"{_short(proposal.separation)} is expected, which is right in {percent(proposal.correct)} of cases "
-        "if the noise is all that is unknown.</p>"
-    )
-    head = ("experiment", "expected d′", "against repeating the record")
-    return f"<section id='next'><h2>What to measure next</h2>{body}{table(head, rows, (1, 2))}</section>"
-
-
-def _short(value: float) -> str:
-    return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
-
-
-def _curve(verdict: Verdict, pictures: dict[str, str]) -> str:
-    curve = verdict.curve
-    if curve is None:
-        return ""
-    rows = [
-        [shown(at), shown(value), f"{shown(low)} to {shown(high)}"]
-        for at, value, (low, high) in zip(curve.at, curve.values, curve.intervals, strict=True)
-    ]
-    head = (f"{spoken(curve.coordinate)} ({curve.coordinate_unit})", f"value ({curve.unit})", "95 % interval")
-    others = ", ".join(
-        f"{words} ({percent(share)})" for words, share in curve.tried.items() if words != curve.words
-    )
-    body = (
-        f"<p><b>{html.escape(curve.words[:1].upper() + curve.words[1:])}</b> explains {percent(curve.share)} "
-        "of what the model leaves (checked on blocks of time left out of the fit).</p>"
-        + pictures.get("curve", "")
-        + (f"<p class='note'>Other curves that were tried: {html.escape(others)}.</p>" if others else "")
-        + f"<details><summary>its corners as numbers</summary>{table(head, rows, (0, 1, 2))}</details>"
-    )
-    return f"<section id='curve'><h2>The curve that is missing</h2>{body}</section>"
-
-
-def _fitted(diagnosis: Diagnosis) -> str:
-    verdict, body = diagnosis.verdict, ""
-    added = diagnosis.final.state.added
-    for effect, own in zip(verdict.effects, added, strict=False):
-        title = effect.title or spoken(effect.name)
-        body += f"<h3>{html.escape(title[:1].upper() + title[1:])} (new)</h3>"
-        body += numbers_table(effect.parameters, settings=own.settings())
-    if verdict.parameters:
-        body += "<h3>The model's own numbers</h3>" + numbers_table(verdict.parameters, verdict.moved)
-        body += (
-            "<p class='note'>Marked at the left: the model's number lies outside the interval. Intervals "
-            "come from the spread over blocks of time, not from the noise alone.</p>"
-        )
-    return _section("Fitted numbers", body) if body else ""
-
-
-def _data(verdict: Verdict) -> str:
-    if not verdict.data_problems:
-        return _section("The data", "<p>No gap, spike, saturation, wrong unit or wrong sign was found.</p>")
-    lines = "".join(
-        f"<tr><td class='{html.escape(p.severity)}'>{html.escape(p.severity)}</td>"
-        + "".join(f"<td>{html.escape(c)}</td>" for c in (p.record, spoken(p.channel), p.kind, p.message))
-        + "</tr>"
-        for p in verdict.data_problems
-    )
-    head = "".join(f"<th>{h}</th>" for h in ("", "record", "channel", "kind", "what was found"))
-    return (
-        "<section id='data'><h2>Problems in the data</h2><div "
-        f"class='wide'><table><tr>{head}</tr>{lines}</table></div></section>"
-    )
-
-
-def _not_tried(verdict: Verdict) -> str:
-    if not verdict.not_tried:
-        return ""
-    reasons: dict[str, list[str]] = {}
-    for name, why in verdict.not_tried.items():
-        reasons.setdefault(why, []).append(spoken(name))
-    rows = [[", ".join(names), why] for why, names in reasons.items()]
-    return _section("Effects that were not tried", table(("effects", "why"), rows))
-
-
-def _method(diagnosis: Diagnosis) -> str:
-    held = diagnosis.bench.training < len(diagnosis.bench.predictors)
-    proof = "the records given for it" if held else "every third stretch of each record"
-    steps = (
-        "The measured motion is prescribed to the model, which predicts the other channels; controllers "
-        "and commands play no part.",
-        "The model's own numbers are fitted first, so that nothing is called missing that a better number "
-        "explains.",
-        "What is left is looked for over time, speed, direction, angle, torque and temperature, and in "
-        "orders of the wave generator's turn.",
-        "Every effect of the catalogue is simulated in the re-fitted model. Its trace must explain blocks "
-        "of time that it has not seen; the best are fitted in full.",
-        f"An effect is named only if its share is at least {percent(LEAST_SHARE)}, and fewer than "
-        f"{percent(LEVEL)} of 400 repetitions of the whole search on residuals with signs turned at random "
-        "do as well: this bounds false alarms of the search, not of one test. The gap is computed on "
-        f"{proof}.",
-    )
-    listed = "".join(f"<li>{html.escape(step)}</li>" for step in steps)
-    spent = sum(diagnosis.verdict.seconds.values())
-    time = f"<p class='note'>It took {spent:.0f} s.</p>" if spent else ""
-    return _section("How it was decided", f"<ol>{listed}</ol>{time}")
-
-
-def _files(verdict: Verdict, pictures: dict[str, str]) -> str:
-    rows = [
-        ["report.html", "this page"],
-        ["verdict.json", "all of it as data"],
-        [
-            "compared.mcap",
-            "measured, before, re-fit and after over the same times, for Foxglove or Lichtblick",
-        ],
-        ["diagnose.json", "the layout for it: import it in the viewer"],
-        [", ".join(f"{name}.png" for name in pictures), "the figures"],
-    ]
-    commands = ""
-    if verdict.scenario:
-        what = "the curve as a table effect" if verdict.curve is not None else "what was found"
-        rows.insert(2, [Path(verdict.scenario).name, f"the model with {what}: extends your scenario"])
-        commands += f"hdsim run {verdict.scenario}    # the model with what was found\n"
-    if verdict.next_experiment is not None and verdict.next_experiment.scenario:
-        rows.insert(3, [Path(verdict.next_experiment.scenario).name, "the next experiment"])
-        commands += f"hdsim run {verdict.next_experiment.scenario}    # the next experiment\n"
-    pre = f"<pre>{html.escape(commands.rstrip())}</pre>" if commands else ""
-    return _section("Files, and what to do with them", table(("file", "what it is"), rows) + pre)

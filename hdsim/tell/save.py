@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdsim.estimate.write import scenario_text
+from hdsim.tell.findings import Findings, gather
 from hdsim.tell.following import next_experiment
 from hdsim.tell.record_out import write_compared
 from hdsim.tell.report import write_report
@@ -15,13 +16,14 @@ if TYPE_CHECKING:
     from hdsim.diagnose.workflow import Diagnosis
 
 
-def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
+def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Findings | None = None) -> Path:
     """Write ``verdict.json``, the scenario, the figures, the log and the report; returns the report's path.
 
     Args:
         diagnosis: what was found.
         base: file of the base scenario.
         out: directory; made when it is not there. Nothing is left in it when a file cannot be written.
+        found: what `gather` makes of the diagnosis, where it is at hand.
 
     Raises:
         InputError: ``out`` cannot be written.
@@ -42,5 +44,5 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path) -> Path:
             (stage / "next.yaml").write_text(experiment, encoding="utf-8")
         write_compared(diagnosis, stage)
         (stage / "verdict.json").write_text(verdict.model_dump_json(indent=2), encoding="utf-8")
-        report = write_report(diagnosis, stage)
+        report = write_report(found or gather(diagnosis), stage)
     return out / report.name

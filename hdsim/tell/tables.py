@@ -1,14 +1,15 @@
-"""Tables of the report and of the terminal."""
+"""Tables and sections of a page, and the rows that a terminal shows too."""
 
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hdsim.diagnose.verdict import Verdict
 from hdsim.estimate.found import FittedNumber
-from hdsim.tell.wording import named_number, shown, spoken, unit_of
+from hdsim.tell.words import named_number, short, shown, spoken, unit_of
 
 GAP_HEAD = ("channel", "unit", "before", "re-fit", "after", "noise", "after/before", "after/noise")
 #: An interval that is wider than this many times its number does not tell it.
@@ -20,9 +21,10 @@ def gap_rows(verdict: Verdict) -> list[list[str]]:
     rows = []
     for channel, gap in verdict.gap.items():
         unit = unit_of(gap)
-        numbers = [f"{unit.factor * v:.3g}" for v in (gap.before, gap.refit, gap.after, gap.noise)]
-        share = f"{100 * gap.after / gap.before:.0f} %" if gap.before > 0 else "-"
-        multiple = f"{gap.after / gap.noise:.2f}" if gap.noise > 0 else "-"
+        numbers = [short(unit.factor * v) for v in (gap.before, gap.refit, gap.after, gap.noise)]
+        known = math.isfinite(gap.after)
+        share = f"{100 * gap.after / gap.before:.0f} %" if known and gap.before > 0 else "-"
+        multiple = f"{gap.after / gap.noise:.2f}" if known and gap.noise > 0 else "-"
         rows.append([spoken(channel), unit.name, *numbers, share, multiple])
     return rows
 
@@ -42,6 +44,17 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
         for row in rows
     )
     return f"<div class='wide'><table><tr>{cells}</tr>{lines}</table></div>"
+
+
+def section(title: str, body: str, kind: str = "") -> str:
+    """A section of a page as HTML.
+
+    Args:
+        title: its heading; it is escaped.
+        body: HTML.
+        kind: class of its style, if any.
+    """
+    return f"<section{f' class={kind}' if kind else ''}><h2>{html.escape(title)}</h2>{body}</section>"
 
 
 def numbers_table(

@@ -6,13 +6,16 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from hdsim.console import console
+from hdsim.tell.because import conditions, weighings
+from hdsim.tell.findings import Findings
 from hdsim.tell.tables import gap_rows
 from hdsim.tell.wording import KINDS, headline, sureness
+from hdsim.tell.words import odds, percent, title_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.diagnose.verdict import Verdict
 
 #: How far a diagnosis is, in percent, when it says that it begins with this. Locating and naming are repeated
 #: as long as something is found, so that the bar waits there.
@@ -67,8 +70,8 @@ class Progress:
         self._bar.update(self._task, completed=self._done, description=escape(text))
 
 
-def show(found: Diagnosis, terminal: Console | None = None) -> None:
-    """Print the verdict, how sure it is, the gap table, and what needs attention."""
+def show(found: Findings, terminal: Console | None = None) -> None:
+    """Print the verdict, how sure it is, the gap table, why, and what needs attention."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -80,24 +83,45 @@ def show(found: Diagnosis, terminal: Console | None = None) -> None:
         out.print(Text.assemble(*parts), highlight=False)
 
     line((verdict.verdict, f"bold {_COLOURS[verdict.verdict]}"), ": ", (KINDS[verdict.verdict], "bold"))
-    line(headline(verdict))
+    line(headline(found))
     line(f"{sure.words}: {sure.number}.", "")
-    table = Table(box=SIMPLE_HEAD, title="\nRMS difference on held-out data", **_STYLE)
-    for name in _HEAD:
-        table.add_column(name, justify="left" if name == "channel" else "right")
-    for channel, unit, *numbers in gap_rows(verdict):
-        table.add_row(f"{channel} ({unit})", *numbers)
-    out.print(table)
+    if verdict.gap:
+        table = Table(box=SIMPLE_HEAD, title="\nRMS difference on held-out data", **_STYLE)
+        for name in _HEAD:
+            table.add_column(name, justify="left" if name == "channel" else "right")
+        for channel, unit, *numbers in gap_rows(verdict):
+            table.add_row(f"{channel} ({unit})", *numbers)
+        out.print(table)
+    for title, head, rows in _reasons(verdict):
+        table = Table(box=SIMPLE_HEAD, title=title, **_STYLE)
+        for name in head:
+            table.add_column(name, justify="right" if name == "seen" else "left", no_wrap=name != head[0])
+        for row in rows:
+            table.add_row(*row)
+        out.print(table)
     for effect in verdict.effects:
         for other in effect.indistinguishable_from:
             why = effect.separated_by.get(other)
             if why:
                 line((f"{effect.name} or {other}", "bold"), f": {why}")
     if verdict.curve is not None:
-        line(("curve", "bold"), f": {verdict.curve.words}, explains {100 * verdict.curve.share:.0f} %")
+        line(("curve", "bold"), f": {verdict.curve.words}, explains {percent(verdict.curve.share)}")
     if verdict.next_experiment is not None:
         line(("next", "bold"), f": {verdict.next_experiment.sentence}")
     for problem in verdict.data_problems:
         if problem.severity != "info":
             style = "bold red" if problem.severity == "error" else "yellow"
             line((problem.severity, style), f": {problem.record}: {problem.channel}: {problem.message}")
+
+
+def _reasons(verdict: Verdict) -> list[tuple[str, tuple[str, ...], list[list[str]]]]:
+    """Title, columns and rows of the tables that say why."""
+    found: list[tuple[str, tuple[str, ...], list[list[str]]]] = []
+    for one in weighings(verdict.because):
+        rows = [[w.words, w.seen, odds(w.log_odds)] for w in one.weights]
+        said = f"{percent(one.probability)}, {'named' if one.named else 'not named'}"
+        found.append((f"Why: {title_of(one.name)} ({said})", ("evidence", "seen", "odds"), rows))
+    rows = [[c.words, c.seen, c.limit, "yes" if c.met else "no"] for c in conditions(verdict.because)]
+    if rows:
+        found.append(("Why", ("asked", "seen", "counts from", "does it?"), rows))
+    return found

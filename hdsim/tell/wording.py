@@ -1,20 +1,30 @@
-"""A verdict in words for readers who have never seen hdsim: how sure it is, what it means, what it gains."""
+"""A verdict in words: what was found, how sure it is, what it means, what it gains."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 from hdsim.diagnose.name import LEVEL
-from hdsim.diagnose.verdict import NamedEffect, Verdict
-from hdsim.estimate.found import FittedNumber, Gap
-from hdsim.plot import units
-from hdsim.scenario.fields import split_unit
-
-if TYPE_CHECKING:
-    from hdsim.diagnose.workflow import Diagnosis
+from hdsim.diagnose.rules import RULES
+from hdsim.diagnose.verdict import Verdict
+from hdsim.estimate.found import FittedNumber
+from hdsim.tell.because import weighings
+from hdsim.tell.findings import Findings
+from hdsim.tell.words import (
+    below,
+    named_number,
+    of_ten,
+    percent,
+    short,
+    shown,
+    spoken,
+    started,
+    title_of,
+    titles_of,
+    unit_of,
+)
 
 KINDS = {
     "nothing": "Nothing is missing",
@@ -29,18 +39,19 @@ MEANINGS = {
     "fitted numbers below, no further effect is seen.",
     "effect": "A known physical effect that the model does not have explains what no change of the model's "
     "own numbers can. It is added, with fitted numbers, in found.yaml.",
-    "unknown": "A pattern is left that repeats, and no known effect explains it well enough to be named: "
+    "unknown": "Something acts that the model does not have, and no known effect is likely enough to be it: "
     "better no name than a wrong one.",
 }
-#: Words for the share of resampled records in which the same name wins, from the highest down.
+#: Words for the probability that a name is right, from the highest down.
 _SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sure"))
 #: Words for how many standard errors the number that moved farthest lies from the model's.
 _FAR = ((6.0, "Very sure"), (3.5, "Sure"), (0.0, "Fairly sure"))
+#: Nothing is called very sure while more than this is left: times the noise, part of the structure.
+MUCH_NOISE, MUCH_STRUCTURE = 2.0, 0.1
 #: Standard deviations in a 95 % interval, from end to end; intervals are made of two to each side.
 _INTERVAL = 4.0
-
-#: How a unit is printed where it is not as scenarios write it.
-_PRINTED = {"degC": "°C", "um": "µm", "^2": "²", "^3": "³"}
+#: How a sentence begins that a warning about the data leads.
+DOUBT = "Check the data first: "
 
 
 @dataclass(frozen=True)
@@ -49,11 +60,88 @@ class Sureness:
 
     words: str
     number: str
-    details: tuple[str, ...]
+    details: tuple[str, ...] = ()
 
 
-def meaning(verdict: Verdict) -> str:
+def headline(found: Findings) -> str:
+    """The verdict for a heading: numbers by words instead of paths, alternatives side by side."""
+    verdict = found.verdict
+    if verdict.verdict == "effect":
+        said = _missing(found)
+    elif verdict.verdict == "parameter":
+        said = _off(verdict)
+    elif verdict.verdict == "unknown":
+        said = _without_a_name(found)
+    else:
+        said = "The data show nothing that the model lacks."
+    return f"Check the data first (below). {said}" if verdict.sentence.startswith(DOUBT) else said
+
+
+def _missing(found: Findings) -> str:
+    parts = []
+    for effect in found.verdict.effects:
+        titles = titles_of(effect)
+        parts.append(" or ".join(titles) + (" (these data cannot tell which)" if len(titles) > 1 else ""))
+    return f"The model is missing {'; and '.join(parts)}.{other_shape(found)}"
+
+
+def other_shape(found: Findings) -> str:
+    """What the names leave, as a sentence; empty where that may be chance."""
+    rest = found.other_shape
+    if rest is None:
+        return ""
+    return (
+        f" {percent(rest[0])} of the structure follows another shape, over the {spoken(rest[1].coordinate)}."
+    )
+
+
+def _off(verdict: Verdict) -> str:
+    if _unsure(verdict):
+        names = [named_number(name)[0] for name in verdict.moved]
+        return "No effect is missing; a number of the model is off, " + (
+            f"most simply {names[0]} (it would explain most of it alone)."
+            if len(names) == 1
+            else f"and these data leave open which: {'; '.join(names)} (each would explain most alone)."
+        )
+    many = len(verdict.moved)
+    count = "one number of the model is off" if many == 1 else f"{many} numbers of the model are off"
+    changes = (
+        _change(name, verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters
+    )
+    return f"No effect is missing; {count}: {', '.join(changes)}."
+
+
+def _without_a_name(found: Findings) -> str:
+    rest, stage = found.verdict.remainder, found.strongest
+    if rest is not None:
+        where = (
+            f"{spoken(rest.channel)} of {rest.record} is left with up to {short(rest.times_noise, 2)} times "
+            f"its noise, most of it between {short(rest.start_s)} and {short(rest.end_s)} s, and follows "
+            "nothing that these data repeat"
+        )
+    elif stage is not None and stage.places:
+        place = stage.places[0]
+        what = f"a function of {spoken(place.coordinate)}"
+        what = "vibration that the motion shakes up" if place.coordinate == "frequency" else what
+        where = f"{percent(place.share)} of what is left of {spoken(place.channel)} is {what}"
+    else:
+        return "Something is missing that has no name."
+    near = nearest(found)
+    return f"Something without a name is missing: {where}{f'. Nearest: {near}' if near else ''}."
+
+
+def nearest(found: Findings) -> str:
+    """The effects that explain most, and how much; empty where none was fitted."""
+    names, share = found.nearest
+    if not names:
+        return ""
+    verb = "explains" if len(names) == 1 else "together explain"
+    return f"{' and '.join(map(title_of, names))}, which {verb} {percent(share)} of the structure"
+
+
+def meaning(found: Findings) -> str:
     """What a verdict means for the reader's model."""
+    verdict = found.verdict
     if verdict.remainder is not None:
         return (
             "Something acts that the model does not have, perhaps once only: a shock, a slip, a stop that "
@@ -61,6 +149,8 @@ def meaning(verdict: Verdict) -> str:
             "record in which it happens again would tell more."
         )
     said = MEANINGS[verdict.verdict]
+    if verdict.verdict == "effect" and found.other_shape is not None:
+        said += " No formula is exact: what it leaves of its own shape is said below, and not in found.yaml."
     if verdict.verdict == "unknown":
         said += (
             " Instead it is given as a curve, which found.yaml adds to the model."
@@ -70,104 +160,9 @@ def meaning(verdict: Verdict) -> str:
     return said
 
 
-def spoken(name: str) -> str:
-    """A name of the program as words."""
-    return name.replace("_", " ")
-
-
-def shown(value: float) -> str:
-    """A number with four digits, without an exponent as long as it stays readable."""
-    if value == 0 or not math.isfinite(value):
-        return f"{value:g}"
-    if 1e-3 <= abs(value) < 1e6:
-        digits = max(0, 3 - math.floor(math.log10(abs(value))))
-        text = f"{value:.{digits}f}"
-        return text.rstrip("0").rstrip(".") if "." in text else text
-    mantissa, _, exponent = f"{value:.3e}".partition("e")
-    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
-
-
-def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[str, str]:
-    """Words and unit of a number by its path: ``drive.friction.coulomb_nm`` is friction, coulomb in N m.
-
-    Args:
-        path: dotted path.
-        settings: of the effect, where the path leads into one; they tell the orders of harmonics.
-    """
-    parts = path.split(".")
-    last, unit = split_unit(parts[-1])
-    for plain, printed in _PRINTED.items():
-        unit = unit.replace(plain, printed)
-    sections: list[str] = []
-    here: Any = settings
-    for part in parts[:-1]:
-        try:
-            here = here[int(part) if part.isdigit() else part] if here is not None else None
-        except (KeyError, IndexError, TypeError):
-            here = None
-        if part.isdigit() and isinstance(here, Mapping) and "order" in here:
-            # The order tells more than the name of the list and the place in it.
-            turn = f" per {spoken(here['per'])}" if here.get("per") else ""
-            sections[-1:] = [f"order {here['order']:g}{turn}"]
-        elif part != "drive":
-            sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
-    return ", ".join([*sections, last]), unit
-
-
-def unit_of(gap: Gap) -> units.Unit:
-    """The unit in which a gap is readable; gaps are stored in SI units."""
-    if gap.unit == "rad":
-        return units.for_error(gap.before)
-    return units.for_torque(gap.before) if gap.unit == "N m" else units.Unit(gap.unit, 1.0)
-
-
-def title_of(name: str) -> str:
-    """The field's term for an effect of the catalogue."""
-    from hdsim.effects import catalogue
-
-    known = catalogue()
-    return known[name].title if name in known else spoken(name)
-
-
-def titles_of(effect: NamedEffect) -> list[str]:
-    """The effect's title, and the titles of those that it cannot be told from."""
-    return [effect.title or spoken(effect.name), *map(title_of, effect.indistinguishable_from)]
-
-
-def headline(verdict: Verdict) -> str:
-    """The verdict's sentence for a heading: numbers by words instead of paths, alternatives side by side."""
-    sentence = verdict.sentence
-    if verdict.verdict == "effect" and any(effect.indistinguishable_from for effect in verdict.effects):
-        parts = []
-        for effect in verdict.effects:
-            titles = titles_of(effect)
-            parts.append(" or ".join(titles) + (" (these data cannot tell which)" if len(titles) > 1 else ""))
-        said = f"The model is missing {'; and '.join(parts)}."
-    elif verdict.verdict == "parameter":
-        if _unsure(verdict):
-            names = [named_number(name)[0] for name in verdict.moved]
-            said = "No effect is missing; a number of the model is off, "
-            said += (
-                f"most simply {names[0]} (it would explain most of it alone)."
-                if len(names) == 1
-                else f"and these data leave open which: {'; '.join(names)} (each would explain most alone)."
-            )
-        else:
-            said = f"No effect is missing; {len(verdict.moved)} numbers of the model are off: "
-            said = said.replace("1 numbers of the model are", "one number of the model is")
-            said += ", ".join(_change(name, verdict.parameters[name]) for name in verdict.moved) + "."
-    else:
-        for channel in verdict.gap:
-            sentence = sentence.replace(channel, spoken(channel))
-        return sentence.replace("is a function of frequency", "is vibration that the motion shakes up")
-    # What is to be checked first stays first.
-    doubt = sentence.partition("Check the data first: ")[2]
-    return f"Check the data first (below). {said}" if doubt else said
-
-
 def _unsure(verdict: Verdict) -> bool:
     """Whether some number is off, but no interval excludes the model's."""
-    numbers = [verdict.parameters[name] for name in verdict.moved]
+    numbers = [verdict.parameters[name] for name in verdict.moved if name in verdict.parameters]
     return all(
         n.interval is None or (n.start is not None and n.interval[0] <= n.start <= n.interval[1])
         for n in numbers
@@ -180,78 +175,118 @@ def _change(name: str, number: FittedNumber) -> str:
     return f"{words} {shown(number.value)}{start} {unit}".rstrip()
 
 
-def sureness(diagnosis: Diagnosis) -> Sureness:
+def sureness(found: Findings) -> Sureness:
     """How sure a diagnosis is."""
-    verdict = diagnosis.verdict
-    search = [stage.screening for stage in diagnosis.stages if stage.screening is not None]
-    last = search[-1].chance if search else 1.0
+    verdict = found.verdict
     if verdict.verdict == "effect":
-        return _of_effects(verdict.effects)
-    if verdict.remainder is not None:
-        number = f"{verdict.remainder.times_noise:.2g} times the noise"
-        said = ["Noise alone leaves every stretch of a record at about its own level."]
-        return Sureness("Sure that something is missing, not what", number, tuple(said))
+        return _of_effects(found)
     if verdict.verdict == "unknown":
-        chance = min(stage.location.chance for stage in diagnosis.stages)
-        share = max(stage.location.structured for stage in diagnosis.stages)
-        said = [
-            f"The chance to see so much of a pattern in pure noise is {below(chance)}.",
-            f"{percent(share)} of what the model leaves, weighed by the noise, is that pattern; the named "
-            "effects explain too little of it.",
-        ]
-        return Sureness("Sure that something is missing, not what", f"{below(chance)} by chance", tuple(said))
-    if last <= LEVEL:
-        nothing_more = (
-            f"An effect of the catalogue explains more than chance does ({below(last)}), but too little, or "
-            "not when fitted in full, to be named."
-        )
-    else:
-        nothing_more = (
-            "Where nothing is missing, some effect of the catalogue looks as good as the best one here in "
-            f"{percent(last)} of cases (one is named only below {percent(LEVEL)})."
-            if search and search[-1].ranked
-            else "No effect of the catalogue could be tried on these data."
-        )
+        return _of_the_unknown(found)
+    more = _nothing_more(found)
     if verdict.verdict == "parameter" and _unsure(verdict):
-        fall = min(gap.refit / gap.before for gap in verdict.gap.values() if gap.before > 0)
-        said = ["No interval excludes the model's number, the gap does: numbers stand in for one another."]
-        said.append(nothing_more)
-        words = "Sure that a number is off, not which"
-        return Sureness(words, f"the re-fit lets a gap fall to {percent(fall)}", tuple(said))
+        falls = [g.refit / g.before for g in verdict.gap.values() if g.before > 0 and math.isfinite(g.refit)]
+        said = "No interval excludes the model's number, the gap does: numbers stand in for one another."
+        number = f"the re-fit lets a gap fall to {percent(min(falls, default=math.nan))}"
+        return Sureness("Sure that a number is off, not which", number, (said, more))
     if verdict.verdict == "parameter":
         far = farthest(verdict)
         number = f"{far:.2g} standard errors" if far < 100 else "over 100 standard errors"
-        said = [f"The number that moved farthest lies {number} from the model's.", nothing_more]
-        return Sureness(_word(_FAR, far), number, tuple(said))
+        said = f"The number that moved farthest lies {number} from the model's."
+        return Sureness(_capped(_word(_FAR, far), found), number, (said, more))
     ratios = [gap.after / gap.noise for gap in verdict.gap.values() if gap.noise > 0]
     worst = max(ratios, default=math.nan)
-    words = "No sign of anything missing" if last > LEVEL else "Nothing that can be named"
-    number = f"{worst:.2g} times the noise is left" if ratios else f"{percent(last)} by chance"
-    return Sureness(words, number, (nothing_more,))
+    words = "No sign of anything missing" if found.search_chance > LEVEL else "Nothing that can be named"
+    if math.isfinite(worst):
+        return Sureness(words, f"{worst:.2g} times the noise is left", (more,))
+    return Sureness(words, f"{percent(found.search_chance)} by chance", (more,))
 
 
-def _of_effects(effects: Sequence[NamedEffect]) -> Sureness:
-    weakest = min(effects, key=lambda effect: effect.confidence)
-    words = _word(_SURE, weakest.confidence)
-    groups = [titles_of(effect) for effect in effects if effect.indistinguishable_from]
-    if groups:
+def _nothing_more(found: Findings) -> str:
+    chance = found.search_chance
+    if chance <= LEVEL:
+        return (
+            f"An effect of the catalogue explains more than chance does ({below(chance)}), but too little, "
+            "or not when fitted in full, to be named."
+        )
+    if chance > 0.995:
+        return "No effect of the catalogue explains more than chance does."
+    return (
+        "Where nothing is missing, some effect of the catalogue looks as good as the best one here in "
+        f"{percent(chance)} of cases (one is looked at only below {percent(LEVEL)})."
+    )
+
+
+def much_left(found: Findings) -> str:
+    """What is left, where it is too much to call anything very sure; empty else."""
+    said = []
+    if found.times_noise > MUCH_NOISE and found.evidence.rest is not None:
+        channel = spoken(found.evidence.rest.channel)
+        said.append(f"{short(found.times_noise, 2)} times the noise of the {channel}")
+    if found.unexplained > MUCH_STRUCTURE:
+        said.append(f"{percent(found.unexplained)} of the structure")
+    return " and ".join(said) + (" is left" if len(said) == 1 else " are left") if said else ""
+
+
+def _capped(words: str, found: Findings) -> str:
+    """The words, with what is left where that is much; then nothing is very sure."""
+    left = much_left(found)
+    return f"{words.replace('Very sure', 'Sure')}, but {left}" if left else words
+
+
+def _of_effects(found: Findings) -> Sureness:
+    effects = found.verdict.effects
+    least = min((effect.confidence for effect in effects), default=0.0)
+    words = _word(_SURE, least)
+    grouped = any(effect.indistinguishable_from for effect in effects)
+    if grouped:
         words += (
             " that it is one of these, not which" if len(effects) == 1 else ", up to the alternatives given"
         )
-    if len(effects) == 1:
-        who = "It or one of its group" if groups else "It"
-        said = [
-            f"{who} is the best explanation in {percent(weakest.confidence)} of resampled records.",
-            f"Where nothing is missing, the whole search finds as much in {below(weakest.chance)} of cases.",
-        ]
-        return Sureness(words, percent(weakest.confidence), tuple(said))
-    said = [
-        f"{effect.title or spoken(effect.name)}: best in {percent(effect.confidence)} of resampled records; "
-        f"by chance in {below(effect.chance)}."
-        for effect in effects
-    ]
-    said.append("By chance: how often the whole search finds as much where nothing is missing.")
-    return Sureness(words, percent(weakest.confidence), tuple(said))
+    sampled = {law.name: law.sampled for law in found.evidence.laws}
+    said = []
+    for effect in effects:
+        parts = [f"{of_ten(effect.confidence)} of such names are right"] if len(effects) > 1 else []
+        if effect.name in sampled:
+            who = "it or one of its group" if effect.indistinguishable_from else "it"
+            parts.append(
+                f"{who} is the best explanation in {percent(sampled[effect.name])} of resampled records"
+            )
+        parts.append(
+            f"where nothing is missing, the whole search finds as much in {below(effect.chance)} of cases"
+        )
+        lead = f"{started(effect.title or spoken(effect.name))}: " if len(effects) > 1 else ""
+        text = "; ".join(parts)
+        said.append(f"{lead}{text if lead else started(text)}.")
+    number = f"{of_ten(least)} of such {'verdicts' if len(effects) == 1 else 'names'} are right"
+    return Sureness(_capped(words, found), number, tuple(said))
+
+
+def _of_the_unknown(found: Findings) -> Sureness:
+    words = "Sure that something is missing, not what"
+    rest, stages = found.verdict.remainder, found.strongest
+    near = nearest(found)
+    said = [f"Nearest: {near}."] if near else []
+    likely = max((one.probability for one in weighings(found.verdict.because)), default=math.nan)
+    if math.isfinite(likely):
+        said.append(
+            f"A name as likely as this is right in {of_ten(likely)} cases; one is given from "
+            f"{of_ten(RULES.believed)}."
+        )
+    if rest is not None:
+        said.insert(0, "Noise alone leaves every stretch of a record at about its own level.")
+        return Sureness(words, f"{short(rest.times_noise, 2)} times the noise", tuple(said))
+    chance = found.pattern_chance
+    if stages is not None:
+        said.insert(
+            0,
+            f"The chance to see so much of a pattern in pure noise is {below(chance)}; "
+            f"{percent(stages.structured)} of what the model leaves, weighed by the noise, is that pattern.",
+        )
+    if chance > RULES.chance and found.times_noise > RULES.rest:
+        return Sureness(words, f"{short(found.times_noise, 2)} times the noise is left", tuple(said))
+    if chance > RULES.chance:
+        words = "Not sure that anything is missing"
+    return Sureness(words, f"{below(chance)} by chance", tuple(said))
 
 
 def farthest(verdict: Verdict) -> float:
@@ -277,7 +312,7 @@ def gains(verdict: Verdict) -> list[str]:
     said = []
     for channel, gap in verdict.gap.items():
         unit = unit_of(gap)
-        before, after, noise = (f"{unit.factor * v:.3g}" for v in (gap.before, gap.after, gap.noise))
+        before, after, noise = (short(unit.factor * v) for v in (gap.before, gap.after, gap.noise))
         change = f"{before} → {after} {unit.name}" if before != after else f"stays at {after} {unit.name}"
         fall = 100 * (gap.after / gap.before - 1) if gap.before > 0 else 0.0
         change += f" ({fall:+.0f} %)" if abs(fall) >= 0.5 else ""
@@ -286,14 +321,4 @@ def gains(verdict: Verdict) -> list[str]:
 
 
 def _word(words: Sequence[tuple[float, str]], value: float) -> str:
-    return next(word for least, word in words if value >= least)
-
-
-def percent(share: float) -> str:
-    """A share in percent; what resampling cannot tell from all is not called all."""
-    return "over 99\u00a0%" if share > 0.995 else f"{100 * share:.0f}\u00a0%"
-
-
-def below(chance: float) -> str:
-    """A probability in percent; what so many draws cannot tell from zero is said as a bound."""
-    return f"less than {100 * chance:.2g}\u00a0%" if chance <= 0.005 else f"{100 * chance:.2g}\u00a0%"
+    return next((word for least, word in words if value >= least), words[-1][1])

@@ -1,0 +1,135 @@
+"""Names, numbers and units as readers who have never seen hdsim write them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from hdsim.diagnose.verdict import NamedEffect
+from hdsim.estimate.found import Gap
+from hdsim.plot import units
+from hdsim.scenario.fields import split_unit
+
+#: What stands where a number is not known.
+UNKNOWN = "not known"
+#: Odds beyond which they are only said to be large.
+LARGE_ODDS = 1000.0
+
+
+def spoken(name: str) -> str:
+    """A name of the program as words."""
+    return name.replace("_", " ")
+
+
+def started(sentence: str) -> str:
+    """With a capital letter at its start."""
+    return sentence[:1].upper() + sentence[1:]
+
+
+def shown(value: float) -> str:
+    """A number with four digits, without an exponent as long as it stays readable."""
+    if not math.isfinite(value):
+        return UNKNOWN
+    if value == 0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e6:
+        digits = max(0, 3 - math.floor(math.log10(abs(value))))
+        text = f"{value:.{digits}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    mantissa, _, exponent = f"{value:.3e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
+
+
+def short(value: float, digits: int = 3) -> str:
+    """A number with few digits; what is no number is said to be unknown."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else UNKNOWN
+
+
+def percent(share: float) -> str:
+    """A share in percent; what resampling cannot tell from all is not called all."""
+    if not math.isfinite(share):
+        return UNKNOWN
+    return "over 99\u00a0%" if share > 0.995 else f"{100 * share:.0f}\u00a0%"
+
+
+def below(chance: float) -> str:
+    """A probability in percent; what so many draws cannot tell from zero is said as a bound."""
+    if not math.isfinite(chance):
+        return UNKNOWN
+    return f"less than {100 * chance:.2g}\u00a0%" if chance <= 0.005 else f"{100 * chance:.2g}\u00a0%"
+
+
+def of_ten(probability: float) -> str:
+    """A probability as how many of ten, or of more where ten do not tell: ``9 in 10``."""
+    if not math.isfinite(probability):
+        return UNKNOWN
+    if probability >= 0.99:
+        return "over 99 in 100"
+    return next(
+        f"{round(many * probability)} in {many}"
+        for many in (10, 20, 50, 100)
+        if round(many * probability) < many or many == 100
+    )
+
+
+def odds(weight: float) -> str:
+    """What a logarithm of odds does to them: ``12 : 1 for``, ``3 : 1 against``."""
+    factor = math.exp(min(abs(weight), 700.0))
+    if not factor >= 1.05:
+        return "neither way"
+    side = "for" if weight > 0 else "against"
+    many = f"over {LARGE_ODDS:.0f}" if factor > LARGE_ODDS else f"{factor:.{0 if factor >= 9.95 else 1}f}"
+    return f"{many.removesuffix('.0')} : 1 {side}"
+
+
+def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[str, str]:
+    """Words and unit of a number by its path: ``drive.friction.coulomb_nm`` is friction, coulomb in N m.
+
+    Args:
+        path: dotted path.
+        settings: of the effect, where the path leads into one; they tell the orders of harmonics.
+    """
+    parts = path.split(".")
+    last, unit = split_unit(parts[-1])
+    sections: list[str] = []
+    here: Any = settings
+    for part in parts[:-1]:
+        try:
+            here = here[int(part) if part.isdigit() else part] if here is not None else None
+        except (KeyError, IndexError, TypeError):
+            here = None
+        if part.isdigit() and isinstance(here, Mapping) and "order" in here:
+            # The order tells more than the name of the list and the place in it.
+            turn = f" per {spoken(here['per'])}" if here.get("per") else ""
+            sections[-1:] = [f"order {here['order']:g}{turn}"]
+        elif part != "drive":
+            sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
+    return ", ".join([*sections, last]), _printed(unit)
+
+
+def _printed(unit: str) -> str:
+    """A unit as it is printed, where scenarios write it otherwise."""
+    for plain, printed in (("degC", "°C"), ("um", "µm"), ("^2", "²"), ("^3", "³")):
+        unit = unit.replace(plain, printed)
+    return unit
+
+
+def unit_of(gap: Gap) -> units.Unit:
+    """The unit in which a gap is readable; gaps are stored in SI units."""
+    if gap.unit == "rad":
+        return units.for_error(gap.before)
+    return units.for_torque(gap.before) if gap.unit == "N m" else units.Unit(gap.unit, 1.0)
+
+
+def title_of(name: str) -> str:
+    """The field's term for an effect of the catalogue."""
+    from hdsim.effects import catalogue
+
+    known = catalogue()
+    return known[name].title if name in known else spoken(name)
+
+
+def titles_of(effect: NamedEffect) -> list[str]:
+    """The effect's title, and the titles of those that it cannot be told from."""
+    return [effect.title or spoken(effect.name), *map(title_of, effect.indistinguishable_from)]
