@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,7 @@ class Residual:
         self.values = self.project(values)
         used, self._blocks = np.unique(blocks, return_inverse=True)
         self.count = len(used)
+        self._order = np.argsort(self._blocks, kind="stable")
         fold = (np.arange(self.count) // TOGETHER) % FOLDS
         self._folds = [np.flatnonzero(fold == k) for k in range(FOLDS) if (fold == k).any()]
         self.powers: Array = np.asarray(np.bincount(self._blocks, self.values**2, self.count), dtype=float)
@@ -80,11 +82,10 @@ class Residual:
             columns: the design.
             rows: rows that count (one channel, say); all by default.
         """
-        x = self.project(columns)
-        y, powers = self.values, self.powers
-        if rows is not None:
-            x, y = x * rows[:, None], y * rows
-            powers = np.asarray(np.bincount(self._blocks, y**2, self.count), dtype=float)
+        # Block after block, so that each has its moments by one product.
+        order = self._order if rows is None else self._order[rows[self._order]]
+        x, y, blocks = self.project(columns)[order], self.values[order], self._blocks[order]
+        powers = np.asarray(np.bincount(blocks, y**2, self.count), dtype=float)
         total = float(powers.sum())
         norm = np.linalg.norm(x, axis=0)
         alive = norm > 1e-6 * max(float(np.linalg.norm(columns)), 1e-300)
@@ -93,11 +94,9 @@ class Residual:
         if k == 0 or total <= 0:
             return Share(0.0, powers, coefficients, np.zeros(DRAWS))
         x = x[:, alive] / norm[alive]
-        moments = np.stack([np.bincount(self._blocks, x[:, a] * y, self.count) for a in range(k)], axis=1)
-        gram = np.empty((self.count, k, k))
-        for a in range(k):
-            for b in range(a, k):
-                gram[:, a, b] = gram[:, b, a] = np.bincount(self._blocks, x[:, a] * x[:, b], self.count)
+        edges = np.searchsorted(blocks, np.arange(self.count + 1))
+        moments = np.stack([x[a:b].T @ y[a:b] for a, b in pairwise(edges)])
+        gram = np.stack([x[a:b].T @ x[a:b] for a, b in pairwise(edges)])
         # A trace of ridge keeps columns that the record does not tell apart from blowing up.
         ridge = 1e-6 * np.eye(k)
         whole, right = gram.sum(axis=0) + ridge, moments.sum(axis=0)

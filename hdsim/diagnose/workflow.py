@@ -83,7 +83,23 @@ def diagnose(
     Raises:
         InputError: the data cannot answer the question, or are suspect (see ``force``).
     """
-    tell = on_step or (lambda _: None)
+    from threadpoolctl import threadpool_limits
+
+    # Its matrices are narrow: threads inside each product cost more than they give, and those outside it
+    # already use the cores.
+    with threadpool_limits(1, user_api="blas"):
+        return _diagnosed(measured, scenario, holdout, load, force, on_step or (lambda _: None))
+
+
+def _diagnosed(
+    measured: Sequence[Recording | Record],
+    scenario: Scenario,
+    holdout: Sequence[Recording | Record],
+    load: LoadSource | None,
+    force: bool,
+    tell: Callable[[str], object],
+) -> Diagnosis:
+    """See ``diagnose``."""
     seconds: dict[str, float] = {}
 
     @contextlib.contextmanager

@@ -48,7 +48,7 @@ def robust_covariance(
             np.hstack([columns, beside[0]]), rest, blocks, np.concatenate([priors, beside[1]])
         )
         return whole[: len(priors), : len(priors)]
-    from scipy.stats import t as student_t
+    from scipy.special import stdtrit
 
     power = max(float(np.mean(rest**2)), 1e-30)
     # The prior keeps a direction that the data say nothing about from having no spread at all.
@@ -70,5 +70,5 @@ def robust_covariance(
     white = power * bread
     low = np.maximum(1.0, np.sqrt(np.diag(white) / np.maximum(np.diag(clustered), 1e-300)))
     telling = variances.sum(axis=0) ** 2 / np.maximum((variances**2).sum(axis=0), 1e-300)
-    scale = low * student_t.ppf(0.975, np.maximum(telling - 1.0, FEWEST_DEGREES)) / 2.0
+    scale = low * stdtrit(np.maximum(telling - 1.0, FEWEST_DEGREES), 0.975) / 2.0
     return np.asarray(clustered * np.outer(scale, scale))
