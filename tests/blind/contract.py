@@ -58,6 +58,8 @@ class Case:
             ``torque sensor``, ``known load``), ``seconds``, ``records``, ``held`` (``stretches``, ``files``),
             ``motion``, ``temperature`` (bool), ``formula`` (``catalogue``, ``other``), and what the family
             adds.
+        without: the same recordings without what was put in, of real machines whose own effects nobody
+            knows; a name counts as found when this case does not get it.
     """
 
     key: str
@@ -71,3 +73,4 @@ class Case:
     strength: tuple[float, ...] = ()
     numbers: dict[str, float] = field(default_factory=dict)
     setup: dict[str, Any] = field(default_factory=dict)
+    without: Case | None = None
