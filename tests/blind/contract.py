@@ -1,8 +1,8 @@
 """What a family of blind plants hands over: a drawn case with its records, its base model and its truth.
 
-A family is a module with one function ``draw(number, seed) -> Case``: everything about the case follows from
-the two numbers. It shares no code with what diagnoses; hdsim may be used to write the base's YAML, and by the
-family whose plant is hdsim's own toothed drive.
+A family is a module ``family_NAME`` with one function ``draw(number, seed) -> Case``: everything about the
+case follows from the two numbers. It shares no code with what diagnoses; hdsim may be used to write the base
+as YAML, and by the family whose plant is hdsim's own toothed drive.
 """
 
 from __future__ import annotations
@@ -11,6 +11,11 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+
+
+class AbsentError(Exception):
+    """What a family needs (a package, recordings) is not here; the message says what."""
+
 
 Kind = Literal["null", "parameter", "effect", "pair", "outside"]
 
@@ -51,7 +56,10 @@ class Case:
             the truth's formula is the catalogue's.
         setup: what was drawn: ``rate_hz``, ``encoder_step_over_noise``, ``sensors`` (``motor``, ``both``,
             ``torque sensor``, ``known load``), ``seconds``, ``records``, ``held`` (``stretches``, ``files``),
-            ``motion``, ``temperature`` (bool), ``formula`` (``catalogue``, ``other``), and more.
+            ``motion``, ``temperature`` (bool), ``formula`` (``catalogue``, ``other``), and what the family
+            adds.
+        without: the same recordings without what was put in, of real machines whose own effects nobody
+            knows; a name counts as found when this case does not get it.
     """
 
     key: str
@@ -65,3 +73,4 @@ class Case:
     strength: tuple[float, ...] = ()
     numbers: dict[str, float] = field(default_factory=dict)
     setup: dict[str, Any] = field(default_factory=dict)
+    without: Case | None = None

@@ -19,7 +19,7 @@ CLOSABLE = 1.1
 
 def groups(line: Line) -> list[list[str]]:
     """Names that were given, a group of indistinguishable ones each, in the order of the verdict."""
-    effects = line["verdict"]["effects"] if line["verdict"] else []
+    effects = line["verdict"]["effects"] if line.get("verdict") else []
     return [sorted({e["name"], *e["indistinguishable_from"]}) for e in effects]
 
 
@@ -37,6 +37,8 @@ def outcome(line: Line) -> str:
     """
     if not line["verdict"]:
         return "error"
+    if "without" in line:
+        return _put_in(line)
     verdict, names, truth = line["verdict"]["verdict"], groups(line), [set(t) for t in line["truth"]]
     kind = line["kind"]
     if kind == "null":
@@ -56,12 +58,48 @@ def outcome(line: Line) -> str:
     return "unknown" if verdict == "unknown" else "nothing"
 
 
+def _put_in(line: Line) -> str:
+    """Outcome for a recording of a real machine into which something was put, against the one without it.
+
+    Of the names only those count that the recording as it is does not get.
+    """
+    truth = set().union(*line["truth"])
+    before = {name for group in groups(line["without"]) for name in group}
+    at = line["setup"].get("at")
+    new = [group for group in groups(line) if not set(group) & before]
+    if truth and _named(line, truth, at) and not _named(line["without"], truth, at):
+        return "right"
+    if any(not set(group) & truth for group in new):
+        return "wrong name"
+    same = line["verdict"]["verdict"] == (line["without"]["verdict"] or {}).get("verdict")
+    if line["verdict"]["verdict"] == "unknown" and not same:
+        return "unknown"
+    return "nothing" if truth else "right"
+
+
+def _named(line: Line, truth: set[str], at: dict[str, Any] | None) -> bool:
+    """Whether a name is given, with a component of the right order, within a factor of two of its size."""
+    for effect, group in zip((line["verdict"] or {}).get("effects", []), groups(line), strict=True):
+        if not _holds(group, truth):
+            continue
+        if at is None or not any(path.endswith(".order") for path in effect["parameters"]):
+            return True
+        for path, number in effect["parameters"].items():
+            if path.endswith(".order") and abs(number["value"] / at["order"] - 1.0) < 0.01:
+                size = effect["parameters"].get(f"{path.removesuffix('.order')}.{at['field']}")
+                if size is None or 0.5 < abs(size["value"] / at["size"]) < 2.0:
+                    return True
+    return False
+
+
 def _holds(group: list[str], wanted: set[str]) -> bool:
     return len(group) <= MOST_NAMES and bool(set(group) & wanted)
 
 
 def false_name(line: Line) -> bool:
     """Whether the first name given is none of the truth's, in a group however large."""
+    if "without" in line:
+        return bool(line["truth"]) and outcome(line) == "wrong name"
     names = groups(line)
     truth = {name for wanted in line["truth"] for name in wanted}
     return bool(names) and not set(names[0]) & truth
@@ -69,6 +107,8 @@ def false_name(line: Line) -> bool:
 
 def false_alarm(line: Line) -> bool:
     """Whether something is said to be missing; for cases in which nothing is."""
+    if "without" in line:
+        return outcome(line) != "right"
     return line["verdict"] is None or line["verdict"]["verdict"] in ("effect", "unknown")
 
 
@@ -153,6 +193,6 @@ def _same_order(path: str, expected: dict[str, float], given: dict[str, Any]) ->
 def borne_out(line: Line) -> bool:
     """Whether what the stated confidence is about is true: the first name, or the verdict without one."""
     names = groups(line)
-    if not names:
+    if not names or "without" in line:
         return outcome(line) == "right"
     return any(_holds(names[0], set(wanted)) for wanted in line["truth"])

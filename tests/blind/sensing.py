@@ -84,7 +84,7 @@ class Setup:
             "motor_torque": d.motor_torque_noise * self.torque_noise,
             "output_angle": output,
             "output_torque": joint,
-            "load_torque": joint,
+            "load_torque": 0.1 * joint,  # what a bench puts on is known better than what a joint carries
             "transmission": float(np.hypot(output, motor / d.ratio)),
             "temperature": 0.05,
         }

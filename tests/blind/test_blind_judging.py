@@ -52,6 +52,52 @@ def test_outcomes(case, wanted):
     assert outcome(case) == wanted
 
 
+def real(verdict, *names, before=(), order=2.0, size=10.0, truth="kinematic_error"):
+    """A line of a real machine: names by their component's order and size."""
+
+    def component(o, a):
+        return (
+            {"components.0.order": {"value": o}, "components.0.amplitude_arcmin": {"value": a}} if o else {}
+        )
+
+    def said(verdict, names):
+        effects = [
+            {"name": name, "indistinguishable_from": [], "confidence": 0.9, "parameters": component(o, a)}
+            for name, o, a in names
+        ]
+        return {"verdict": verdict, "suspects": {}, "effects": effects}
+
+    at = {"order": order, "field": "amplitude_arcmin", "size": size}
+    return line("effect" if truth else "null", [[truth]] if truth else [], "") | {
+        "setup": {"at": at},
+        "verdict": said(verdict, names),
+        "without": {"verdict": said("effect", before)},
+    }
+
+
+OWN = ("stribeck_friction", 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "wanted"),
+    [
+        (real("effect", OWN, ("kinematic_error", 2.0, 9.0), before=[OWN]), "right"),
+        # The joint has that order of its own, far smaller.
+        (real("effect", ("kinematic_error", 2.0, 9.0), before=[("kinematic_error", 2.0, 1.0)]), "right"),
+        (real("effect", ("kinematic_error", 2.0, 9.0), before=[("kinematic_error", 2.0, 9.0)]), "nothing"),
+        (real("effect", ("kinematic_error", 4.0, 9.0), before=[OWN]), "nothing"),
+        (real("effect", ("damaged_tooth", 0.0, 0.0), before=[OWN]), "wrong name"),
+        (real("effect", OWN, before=[OWN]), "nothing"),
+        (real("unknown", before=[OWN]), "unknown"),
+        (real("effect", OWN, before=[OWN], truth=""), "right"),
+        (real("effect", ("unbalance", 0.0, 0.0), before=[OWN], truth=""), "wrong name"),
+    ],
+)
+def test_outcomes_beside_the_recording_without_it(case, wanted):
+    assert outcome(case) == wanted
+    assert false_name(case) == (wanted == "wrong name" and bool(case["truth"]))
+
+
 def test_false_names_and_alarms():
     assert false_name(line("effect", ONE, "effect", ["unbalance"]))
     assert not false_name(line("effect", ONE, "effect", ["a", "b", "c", "stribeck_friction"]))
@@ -88,8 +134,9 @@ def test_what_can_be_closed_and_numbers_that_hold():
     measured = Measured(
         "a", np.arange(4000.0), {"motor_torque": rng.normal(0, 2.0, 4000)}, {"motor_torque": ideal}
     )
-    case = Case("numpy/effect/x/0/1", "numpy", "effect", (frozenset({"kinematic_error"}),), (measured,), (), "",
-                numbers={"components.0.order": 2.0, "components.0.phase_deg": 359.0, "load.inertia_kg_m2": 3.0})  # fmt: skip
+    true = {"components.0.order": 2.0, "components.0.phase_deg": 359.0, "load.inertia_kg_m2": 3.0}
+    hidden = (frozenset({"kinematic_error"}),)
+    case = Case("numpy/effect/x/0/1", "numpy", "effect", hidden, (measured,), (), "", numbers=true)
     gap = {"motor_torque": {"refit": 12.0, "after": 3.0, "noise": 9.0}}
     assert closed(case, gap) == pytest.approx(0.9, abs=0.01)
     assert closed(case, {"motor_torque": {"refit": 2.1, "after": 3.0, "noise": 9.0}}) is None

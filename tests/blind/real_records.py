@@ -1,0 +1,175 @@
+"""Recordings of real joints, with the plain model of each; nothing here imports hdsim.
+
+Kinova Gen3 (strain wave, 100:1): angle and torque sensor of the output and the motor's current at 1 kHz.
+NEURA LARA8 joint 3 (101:1): encoders of motor and load and the motor's current at 250 Hz. Sources and
+licences are in the SOURCE.md beside the files; where those are not, there is no such family.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from contract import AbsentError, Measured
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+KINOVA = "kinova-gen3-7dof/validation_data/opti_traj_testing{}.csv"
+LARA = "lara8-joint3-dual-encoder/joint3.csv"
+
+#: Output Coulomb (N m) and viscous (N m s/rad) friction of the Kinova joints, as read off in SOURCE.md.
+KINOVA_FRICTION = {1: (2.66, 3.02), 3: (2.17, 2.40), 4: (2.44, 2.54), 6: (1.18, 0.90), 7: (1.14, 0.85)}
+#: N m at the output per ampere (SOURCE.md).
+KINOVA_CONSTANT = {1: 9.130, 3: 9.130, 4: 9.130, 6: 5.852, 7: 5.852}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint with its plain model, SI units.
+
+    Attributes:
+        name: of the joint.
+        ratio: motor over output.
+        sensors: in the words of a case's setup.
+        base: the plain model as YAML: ratio, friction, stiffness and load, no effect.
+        coulomb: friction at the motor, N m.
+        stiffness: of the drive at the output, N m/rad; 0: rigid.
+        inertia: of the load, kg m^2; ``hanging`` the angle at which its arm hangs.
+        load: where the load's torque comes from.
+        records: recordings.
+    """
+
+    name: str
+    ratio: float
+    sensors: str
+    base: str
+    coulomb: float
+    stiffness: float
+    inertia: float
+    load: str | None
+    records: tuple[Measured, ...]
+    hanging: float = 0.0
+
+
+def _table(name: str) -> np.ndarray:
+    path = DATA / name
+    if not path.exists():
+        raise AbsentError(f"family real: the recordings are not here ({name} beside the project)")
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
+BASE = """name: {name}
+description: Plain model of a real joint; its friction, nothing else.
+drive:
+  rated_torque_nm: {rated}
+  arrangement: flexspline_fixed
+  geometry: {{flexspline_teeth: {flexspline}, circular_spline_teeth: {circular}}}
+  torsion:
+    stiffness_k1_nm_per_rad: {stiffness:.6g}
+    stiffness_k2_nm_per_rad: {stiffness:.6g}
+    stiffness_k3_nm_per_rad: {stiffness:.6g}
+    torque_t1_nm: {t1}
+    torque_t2_nm: {t2}
+    damping_nm_s_per_rad: {damping:.6g}
+  inertia: {{motor_kg_m2: {motor:.6g}, wave_generator_kg_m2: {generator:.6g}}}
+  friction: {{coulomb_nm: {coulomb:.6g}, viscous_nm_s_per_rad: {viscous:.6g}}}
+  mesh: {{model: {mesh}}}
+command:
+  motor: {{type: free}}
+load:
+  inertia_kg_m2: {inertia:.6g}
+{gravity}run: {{duration_s: 1.0}}
+"""
+
+
+@lru_cache(maxsize=8)
+def kinova(joint: int) -> Joint:
+    """A joint of the Kinova Gen3; its second recording is another motion.
+
+    Raises:
+        AbsentError: the recordings are not here.
+    """
+    ratio, records = 100.0, []
+    for k in (1, 2):
+        table = _table(KINOVA.format(k))
+        channels = {
+            "output_angle": table[f"Position{joint}"],
+            "motor_torque": table[f"Cur{joint}"] * KINOVA_CONSTANT[joint] / ratio,
+            "output_torque": table[f"TorqueSm{joint}"],
+            "temperature": table[f"Temp{joint}"],
+        }
+        time = 1e-3 * (table["Time"] - table["Time"][0])
+        records.append(Measured(f"joint {joint}, record {k}", time, channels))
+    coulomb, viscous = KINOVA_FRICTION[joint]
+    # The stiffness of a rigid mesh has no meaning; inertias are estimates.
+    text = BASE.format(
+        name=f"Kinova Gen3 joint {joint}", rated=30, flexspline=198, circular=200, stiffness=1.6e4, t1=7,
+        t2=25, damping=8.0, motor=3e-5, generator=1e-5, coulomb=coulomb / ratio, viscous=viscous / ratio**2,
+        mesh="rigid", inertia=1e-4, gravity="",
+    )  # fmt: skip
+    return Joint(
+        f"kinova {joint}", ratio, "torque sensor", text, coulomb / ratio, 0.0, 0.0, "output_torque",
+        tuple(records),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def lara() -> Joint:
+    """Joint 3 of the LARA8.
+
+    Raises:
+        AbsentError: the recording is not here.
+    """
+    ratio, turn = 101.0, 2 * np.pi / 2**24
+    table = _table(LARA)
+    time = table["Timestamp"] - table["Timestamp"][0]
+    motor = table["encoder_motorinc_3"] * turn
+    output = np.unwrap(table["encoder_loadinc_3"] * turn)
+    # The motor's encoder has a zero of its own.
+    motor = motor + ratio * np.mean(output - motor / ratio)
+    torque = table["joint_torque_current_3"] / ratio
+    record = Measured("joint 3", time, {"motor_angle": motor, "output_angle": output, "motor_torque": torque})
+    # Stiffness as in SOURCE.md, friction by its author's law there. Weight and inertia follow from the twist.
+    stiffness = 2.2e4
+    weight, hanging, inertia = _arm(record, ratio, stiffness)
+    coulomb, viscous = (6.53 + 1.149) / ratio, 12 * 1.149 / ratio**2
+    gravity = (
+        f"  gravity: {{mass_kg: {weight / 9.80665 / 0.4:.6g}, centre_of_mass_m: 0.4, "
+        f"hanging_angle_deg: {np.degrees(hanging):.6g}}}\n"
+    )
+    text = BASE.format(
+        name="LARA8 joint 3", rated=100, flexspline=200, circular=202, stiffness=stiffness, t1=20, t2=60,
+        damping=20.0, motor=2e-4, generator=5e-5, coulomb=coulomb, viscous=viscous, mesh="lumped",
+        inertia=inertia, gravity=gravity,
+    )  # fmt: skip
+    return Joint("lara 3", ratio, "both", text, coulomb, stiffness, inertia, None, (record,), hanging)
+
+
+def _arm(record: Measured, ratio: float, stiffness: float) -> tuple[float, float, float]:
+    """Weight times lever (N m), angle at which the arm hangs (rad), inertia (kg m^2), from the twist."""
+    output = record.channels["output_angle"]
+    twist = record.channels["motor_angle"] / ratio - output
+    _, acceleration = rates(record.time, output)
+    columns = np.column_stack([np.ones_like(output), np.cos(output), np.sin(output), acceleration])
+    _, c, s, a = stiffness * np.linalg.lstsq(columns, twist, rcond=None)[0]
+    # Twist times stiffness is w sin(q - h) + J q'' = w cos(h) sin(q) - w sin(h) cos(q) + J q''.
+    return float(np.hypot(c, s)), float(np.arctan2(-c, s)), float(max(a, 0.5))
+
+
+def rates(time: np.ndarray, angle: np.ndarray, over_s: float = 0.15) -> tuple[np.ndarray, np.ndarray]:
+    """Speed and acceleration of a measured angle, cubic over a moving window; shape (n,) each."""
+    from scipy.signal import savgol_filter
+
+    step = float(np.median(np.diff(time)))
+    even = np.arange(0.0, time[-1] - time[0] + step, step)
+    width = max(5, 2 * round(over_s / step / 2) + 1)
+    values = np.interp(even, time - time[0], angle)
+    return tuple(  # type: ignore[return-value]
+        np.interp(time - time[0], even, savgol_filter(values, width, 3, deriv=k, delta=step)) for k in (1, 2)
+    )
+
+
+def noise_of(values: np.ndarray) -> float:
+    """Standard deviation of white noise, from the median of fourth differences (whose variance is 70)."""
+    return float(np.median(np.abs(np.diff(values, 4))) / 0.6745 / np.sqrt(70.0))

@@ -1,0 +1,102 @@
+"""Effects that are put into recordings of real joints, against closed forms."""
+
+import family_real as family
+import numpy as np
+import pytest
+from contract import AbsentError, Measured
+from real_records import Joint, lara, noise_of, rates
+
+try:
+    family.joints()
+    HERE = True
+except AbsentError:
+    HERE = False
+recordings = pytest.mark.skipif(not HERE, reason="the recordings are not here")
+
+
+def joint(stiffness=2.0e4, inertia=5.0, hz=1000.0, speed=3.0):
+    time = np.arange(0.0, 6.0, 1.0 / hz)
+    channels = {"motor_angle": 100.0 * speed * time / 100.0, "output_angle": speed * time / 100.0,
+                "motor_torque": np.zeros_like(time)}  # fmt: skip
+    record = Measured("made", time, channels)
+    return Joint("made 1", 100.0, "both", "", 0.05, stiffness, inertia, None, (record,)), record
+
+
+@pytest.mark.parametrize("speed", [3.0, 100.0])
+def test_a_kinematic_error_moves_the_output_as_an_oscillator_answers(speed):
+    """Amplitude over that of the error: k / |k - J w^2 + i c w|; the motor carries k (e - d) / i."""
+    made, record = joint(speed=speed)
+    error = 1e-4 * np.sin(2 * record.channels["motor_angle"])
+    found = family.through(made, record, error, np.zeros_like(error))
+    k, inertia, w = made.stiffness, made.inertia, 2 * speed
+    c = 2 * family.DAMPING * np.sqrt(k * inertia)
+    answer = 1e-4 * k / abs(k - inertia * w**2 + 1j * c * w)
+    late = record.time > 3.0
+    assert np.ptp(found["output_angle"][late]) / 2 == pytest.approx(answer, rel=0.03)
+    # What the motor carries more is what the output's inertia and damping take.
+    carried = abs(-inertia * w**2 + 1j * c * w) * answer / made.ratio
+    assert np.ptp(found["motor_torque"][late]) / 2 == pytest.approx(carried, rel=0.05)
+
+
+def test_a_slow_weight_twists_the_drive_and_loads_the_motor_as_statics_say():
+    made, record = joint(speed=20.0)
+    found = family.weight(made, record, 40.0, np.random.default_rng(3))
+    late = record.time > 2.0
+    twist = found["output_angle"][late]
+    assert np.ptp(found["motor_torque"][late] + made.stiffness * twist / made.ratio) < 1e-9
+    angle = record.channels["output_angle"][late]
+    columns = np.column_stack([np.cos(angle), np.sin(angle)])
+    fitted = np.linalg.lstsq(columns, -made.stiffness * twist, rcond=None)[0]
+    assert np.hypot(*fitted) == pytest.approx(40.0, rel=0.01)
+
+
+def test_noise_and_rates_of_made_signals():
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 5.0, 1e-3)
+    angle = np.sin(2 * time)
+    assert noise_of(angle + rng.normal(0, 3e-4, len(time))) == pytest.approx(3e-4, rel=0.05)
+    speed, acceleration = rates(time, angle)
+    inside = slice(200, -200)
+    assert np.abs(speed - 2 * np.cos(2 * time))[inside].max() < 0.01
+    assert np.abs(acceleration + 4 * np.sin(2 * time))[inside].max() < 0.02
+
+
+@recordings
+def test_cases_are_the_recording_and_what_was_put_in():
+    drawn = [family.draw(n, 1) for n in range(40)]
+    assert [c.key for c in drawn] == [family.draw(n, 1).key for n in range(40)]
+    assert {c.setup["joint"] for c in drawn} == {
+        "kinova 1",
+        "kinova 3",
+        "kinova 4",
+        "kinova 6",
+        "kinova 7",
+        "lara 3",
+    }
+    for case in drawn:
+        assert case.without is not None
+        for with_it, without in zip(case.records, case.without.records, strict=True):
+            changed = {c for c, v in with_it.channels.items() if not np.array_equal(v, without.channels[c])}
+            assert changed
+            assert changed <= {"motor_torque", "output_angle", "output_torque"}
+        if case.kind == "effect":
+            assert family.LEAST <= case.strength[0] <= family.STRENGTH[1] * 1.001
+    # The sensor carries what the weight adds: the difference of the torques, which is friction's, stays.
+    carried = next(c for c in drawn if c.kind == "null")
+    for with_it, without in zip(carried.records, carried.without.records, strict=True):
+        rest = [r.channels["motor_torque"] * 100 - r.channels["output_torque"] for r in (with_it, without)]
+        assert np.abs(rest[0] - rest[1]).max() < 1e-9
+
+
+@recordings
+def test_the_plain_model_of_the_joint_with_both_encoders_has_its_recorded_ratio_and_statics():
+    known = lara()
+    record = known.records[0]
+    twist = record.channels["motor_angle"] / known.ratio - record.channels["output_angle"]
+    _, acceleration = rates(record.time, record.channels["output_angle"])
+    output = record.channels["output_angle"]
+    mass = float(known.base.split("mass_kg: ")[1].split(",")[0])
+    weight = mass * 9.80665 * 0.4 * np.sin(output - known.hanging)
+    rest = twist - (weight + known.inertia * acceleration) / known.stiffness
+    # 40 arcsec of friction and transmission error beside 400 of twist.
+    assert np.std(rest) < 0.15 * np.std(twist)
