@@ -24,7 +24,9 @@ class Wording:
 
 def _part(share: float) -> str:
     """A share that may lie beyond 0 and 1."""
-    return percent(share) if 0.0 <= share <= 1.0 or not math.isfinite(share) else f"{100 * share:.0f}\u00a0%"
+    if not math.isfinite(share) or 0.0 <= share <= 1.0:
+        return percent(share)
+    return f"{round(100 * share)}\u00a0%".replace("-", "−")
 
 
 def _times(value: float) -> str:

@@ -67,8 +67,8 @@ def gap_figure(verdict: Verdict, found: dict[str, Bars]) -> Figure | None:
     if not verdict.gap:
         return None
     with rc_context(style.STYLE):
-        stages = max(map(len, found.values()))
-        figure = Figure(figsize=(WIDTH, 0.95 + 0.33 * stages), layout="constrained")
+        most = max(map(len, found.values()))
+        figure = Figure(figsize=(WIDTH, 0.95 + 0.33 * most), layout="constrained")
         grid = figure.subplots(1, len(verdict.gap), squeeze=False, sharey=True)[0]
         for axes, (channel, gap) in zip(grid, verdict.gap.items(), strict=True):
             _gap_panel(axes, gap, found[channel])

@@ -15,7 +15,7 @@ import numpy as np
 from hdsim.diagnose.evidence import Evidence, PlaceEvidence, StageEvidence
 from hdsim.diagnose.locate import Line, coordinates, order_lines
 from hdsim.diagnose.rules import RULES
-from hdsim.diagnose.verdict import Verdict
+from hdsim.diagnose.verdict import Remainder, Verdict
 from hdsim.diagnose.workflow import LEAST_REST
 from hdsim.estimate.prove import held_out_gap
 
@@ -126,6 +126,17 @@ class Findings:
     def places(self) -> list[PlaceEvidence]:
         """Where the re-fitted model's residual lives, strongest first."""
         return self.evidence.stages[0].places if self.evidence.stages else []
+
+    @property
+    def patterned(self) -> bool:
+        """Whether what is left is, beyond chance, a function of some coordinate."""
+        evidence = self.evidence
+        return evidence.left_chance <= RULES.chance and evidence.left >= RULES.structured
+
+    @property
+    def once(self) -> Remainder | None:
+        """What is left without a place, where it is no pattern and no curve says it better."""
+        return None if self.patterned or self.verdict.curve is not None else self.verdict.remainder
 
     @property
     def nearest(self) -> tuple[list[str], float]:

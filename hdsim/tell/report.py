@@ -38,7 +38,7 @@ _CAPTIONS = {
     "twice the sensor's noise to either side; what stays inside is explained. Sensors' offsets are taken "
     "out.",
     "whole": "The same difference over the whole record. Shaded: held out, no fit has seen it.",
-    "curve": "The curve that is missing, with the 95 % interval of each corner. What the model's own numbers "
+    "curve": "The curve with the 95 % interval of each corner. What the model's own numbers "
     "could explain as well, such as a constant, is left out.",
 }
 _ALTS = {

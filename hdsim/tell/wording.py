@@ -112,12 +112,12 @@ def _off(verdict: Verdict) -> str:
 
 
 def _without_a_name(found: Findings) -> str:
-    rest, stage = found.verdict.remainder, found.strongest
+    rest, stage = found.once, found.strongest
     if rest is not None:
         where = (
-            f"{spoken(rest.channel)} of {rest.record} is left with up to {short(rest.times_noise, 2)} times "
-            f"its noise, most of it between {short(rest.start_s)} and {short(rest.end_s)} s, and follows "
-            "nothing that these data repeat"
+            f"{started(spoken(rest.channel))} of {rest.record} is left with up to "
+            f"{short(rest.times_noise, 2)} times its noise, most of it between {short(rest.start_s)} and "
+            f"{short(rest.end_s)} s, and follows nothing that these data repeat"
         )
     elif stage is not None and stage.places:
         place = stage.places[0]
@@ -125,9 +125,11 @@ def _without_a_name(found: Findings) -> str:
         what = "vibration that the motion shakes up" if place.coordinate == "frequency" else what
         where = f"{percent(place.share)} of what is left of {spoken(place.channel)} is {what}"
     else:
-        return "Something is missing that has no name."
+        return "Something is missing that no known effect is likely enough to be."
     near = nearest(found)
-    return f"Something without a name is missing: {where}{f'. Nearest: {near}' if near else ''}."
+    if near:
+        return f"{where}. Nearest: {near}, not enough like it to be named."
+    return f"{where}. No known effect comes near."
 
 
 def nearest(found: Findings) -> str:
@@ -142,7 +144,7 @@ def nearest(found: Findings) -> str:
 def meaning(found: Findings) -> str:
     """What a verdict means for the reader's model."""
     verdict = found.verdict
-    if verdict.remainder is not None:
+    if found.once is not None:
         return (
             "Something acts that the model does not have, perhaps once only: a shock, a slip, a stop that "
             "the motion reached a single time. What does not repeat cannot be tested, so it gets no name; a "
@@ -263,7 +265,7 @@ def _of_effects(found: Findings) -> Sureness:
 
 def _of_the_unknown(found: Findings) -> Sureness:
     words = "Sure that something is missing, not what"
-    rest, stages = found.verdict.remainder, found.strongest
+    rest, stage = found.once, found.strongest
     near = nearest(found)
     said = [f"Nearest: {near}."] if near else []
     likely = max((one.probability for one in weighings(found.verdict.because)), default=math.nan)
@@ -276,11 +278,11 @@ def _of_the_unknown(found: Findings) -> Sureness:
         said.insert(0, "Noise alone leaves every stretch of a record at about its own level.")
         return Sureness(words, f"{short(rest.times_noise, 2)} times the noise", tuple(said))
     chance = found.pattern_chance
-    if stages is not None:
+    if stage is not None:
         said.insert(
             0,
             f"The chance to see so much of a pattern in pure noise is {below(chance)}; "
-            f"{percent(stages.structured)} of what the model leaves, weighed by the noise, is that pattern.",
+            f"{percent(stage.structured)} of what the model leaves, weighed by the noise, is that pattern.",
         )
     if chance > RULES.chance and found.times_noise > RULES.rest:
         return Sureness(words, f"{short(found.times_noise, 2)} times the noise is left", tuple(said))

@@ -105,14 +105,13 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
             sections[-1:] = [f"order {here['order']:g}{turn}"]
         elif part != "drive":
             sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
-    return ", ".join([*sections, last]), _printed(unit)
+    return ", ".join([*sections, last]), written(unit)
 
 
-def _printed(unit: str) -> str:
-    """A unit as it is printed, where scenarios write it otherwise."""
-    for plain, printed in (("degC", "°C"), ("um", "µm"), ("^2", "²"), ("^3", "³")):
-        unit = unit.replace(plain, printed)
-    return unit
+def written(unit: str) -> str:
+    """A unit with the signs of print: ``kg m^2`` is kg m²."""
+    unit = "µm" if unit == "um" else unit
+    return unit.replace("^2", "²").replace("^3", "³").replace("degC", "°C")
 
 
 def unit_of(gap: Gap) -> units.Unit:

@@ -1,0 +1,212 @@
+"""What is said of each kind of verdict, from evidence written by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from telling import (
+    EFFECT,
+    GAP,
+    KINDS,
+    NOTHING,
+    PARAMETER,
+    UNKNOWN,
+    candidate,
+    law,
+    page,
+    place,
+    rest,
+    stage,
+    told,
+)
+
+from hdsim.diagnose.evidence import HeldOutEvidence
+from hdsim.diagnose.further import CurveFound
+from hdsim.diagnose.verdict import Remainder
+from hdsim.estimate.found import FittedNumber
+from hdsim.tell.wording import farthest, headline, meaning, much_left, sureness
+
+FRICTION = "drive.friction.coulomb_nm"
+CURVE = CurveFound(
+    words="torque on the output over output angle", coordinate="output_angle", coordinate_unit="rad",
+    acts_on="output_torque", at=[-1.0, 0.0, 1.5], values=[0.25, -0.125, 0.75],
+    intervals=[(0.2, 0.3), (-0.2, -0.05), (0.5, 1.0)], unit="N m", share=0.4,
+    tried={"torque on the output over output angle": 0.4, "torque on the motor over time": 0.1},
+)  # fmt: skip
+
+
+def confident(probability: float, **evidence):
+    """A named effect of this probability."""
+    found = told(EFFECT.model_copy(update=evidence))
+    effects = [one.model_copy(update={"confidence": probability}) for one in found.verdict.effects]
+    return type(found)(found.verdict.model_copy(update={"effects": effects}), found.evidence)
+
+
+@pytest.mark.parametrize(
+    ("probability", "words", "number"),
+    [
+        (0.999, "Very sure", "over 99 in 100"),
+        (0.97, "Very sure", "19 in 20"),
+        (0.9, "Sure", "9 in 10"),
+        (0.72, "Fairly sure", "7 in 10"),
+        (0.5, "Not sure", "5 in 10"),
+    ],
+)
+def test_a_name_is_as_sure_as_it_is_likely(probability, words, number):
+    sure = sureness(confident(probability))
+    assert sure.words == words
+    assert sure.number == f"{number} of such verdicts are right"
+
+
+@pytest.mark.parametrize(
+    ("evidence", "left"),
+    [
+        ({"rest": rest(4.2)}, "4.2 times the noise of the motor torque"),
+        ({"explained": 0.84}, "16\u00a0% of the structure"),
+        ({"rest": rest(50.0), "explained": 0.23}, "50 times the noise of the motor torque and 77\u00a0%"),
+    ],
+)
+def test_nothing_is_very_sure_while_much_is_left(evidence, left):
+    found = confident(0.995, **evidence)
+    sure = sureness(found)
+    assert sure.words.startswith("Sure, but ")
+    assert left in sure.words
+    assert "very" not in sure.words.lower()
+
+
+def test_little_that_is_left_is_not_much():
+    assert much_left(confident(0.99, rest=rest(1.9), explained=0.91)) == ""
+    assert much_left(told(NOTHING)) == ""
+
+
+def test_numbers_that_are_far_off_are_not_very_sure_while_much_is_left():
+    number = FittedNumber(value=0.045, interval=(0.0449, 0.0451), start=0.03)
+    fields = {"parameters": {FRICTION: number}, "moved": [FRICTION]}
+    assert sureness(told(PARAMETER, **fields)).words == "Very sure"
+    left = told(PARAMETER.model_copy(update={"rest": rest(3.0)}), **{"verdict": "parameter"} | fields)
+    assert sureness(left).words == "Sure, but 3 times the noise of the motor torque is left"
+
+
+def test_a_group_is_sure_as_a_group():
+    found = told(EFFECT.model_copy(update={"laws": [law(group=["unbalance"])]}))
+    assert "(these data cannot tell which)" in headline(found)
+    assert "that it is one of these, not which" in sureness(found).words
+    assert "it or one of its group is the best" in sureness(found).details[0].lower()
+
+
+def test_what_a_name_leaves_is_said_with_its_place():
+    stages = [stage(0.9, 0.0025), stage(0.4, 0.0025)]
+    found = told(EFFECT.model_copy(update={"explained": 0.91, "left_chance": 0.0025, "stages": stages}))
+    assert headline(found).endswith("9\u00a0% of the structure follows another shape, over the output angle.")
+    assert "another shape" not in headline(told(EFFECT.model_copy(update={"explained": 0.91})))  # chance
+
+
+def test_a_curve_beside_a_name_is_what_the_name_leaves(tmp_path):
+    changed = {"explained": 0.91, "left_chance": 0.0025}
+    found = told(EFFECT.model_copy(update=changed), curve=CURVE, scenario="out/found.yaml")
+    text = page(found, tmp_path)
+    assert "What the named effects leave" in text
+    assert "9\u00a0% of it follows another shape" in text
+    assert "The curve that is missing" not in text
+    assert "the model with what was found" in text
+    assert "with the curve" not in text
+    assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_has_no_name_is_said_with_what_came_nearest(tmp_path):
+    found = told(UNKNOWN, suspects={"stribeck_friction": 0.86})
+    said = headline(found)
+    assert "Stribeck" in said
+    assert "86\u00a0% of the structure" in said
+    text = page(found, tmp_path)
+    assert "nothing in the catalogue explains" not in text.lower()
+    assert "No known effect comes near" not in text
+    assert "Sure that something is missing, not what" in text
+    assert any(f"is right in {n} in 10 cases" in text for n in range(6))
+
+
+def test_a_fitted_candidate_comes_nearest_where_no_law_was_added():
+    stages = [
+        stage(0.9, 0.0025, candidates=[candidate("unbalance", 0.3), candidate("stribeck_friction", 0.6)])
+    ]
+    said = headline(told(UNKNOWN.model_copy(update={"laws": [], "stages": stages})))
+    assert "Stribeck" in said
+    assert "60\u00a0%" in said
+    assert "No known effect comes near" in headline(
+        told(UNKNOWN.model_copy(update={"laws": [], "stages": [stage(0.9, 0.0025)]}))
+    )
+
+
+def test_vibration_is_called_so():
+    shaken = stage(0.9, 0.0025)
+    shaken.places = [place("frequency", 0.7)]
+    assert "is vibration that the motion shakes up" in headline(
+        told(UNKNOWN.model_copy(update={"stages": [shaken]}))
+    )
+
+
+ONCE = Remainder(record="a.csv", channel="motor_torque", times_noise=16.0, start_s=0.5, end_s=0.9)
+PLACELESS = UNKNOWN.model_copy(update={"laws": [], "left": 0.02, "left_chance": 0.5, "stages": []})
+
+
+def test_what_happens_once_is_said_with_its_time():
+    found = told(PLACELESS, remainder=ONCE)
+    assert "between 0.5 and 0.9 s" in headline(found)
+    assert "perhaps once only" in meaning(found)
+    assert sureness(found).number == "16 times the noise"
+
+
+@pytest.mark.parametrize("changes", [{"curve": CURVE}, {}])
+def test_a_pattern_is_not_said_to_happen_once(changes):
+    evidence = PLACELESS if changes else UNKNOWN
+    found = told(evidence, remainder=ONCE, **changes)
+    assert "between 0.5" not in headline(found)
+    assert "once" not in meaning(found)
+
+
+def test_a_suspect_that_may_be_chance_is_not_sure():
+    evidence = PLACELESS.model_copy(
+        update={"laws": [law(chance=0.3, sampled=0.4)], "rest": rest(1.0), "held": HeldOutEvidence(slope=0.0)}
+    )
+    found = told(evidence)
+    assert found.verdict.verdict == "unknown"
+    assert sureness(found).words == "Not sure that anything is missing"
+
+
+def test_nothing_is_said_with_what_is_left(tmp_path):
+    gap = {"motor_torque": GAP.model_copy(update={"after": 1.25 * GAP.noise})}
+    text = page(told(NOTHING, gap=gap), tmp_path)
+    assert "The data show nothing that the model lacks." in text
+    assert "1.2 times the noise is left" in text
+    assert "may still be there" in text
+
+
+def test_what_the_data_make_doubtful_comes_first():
+    for evidence in KINDS.values():
+        fields = {"parameters": {FRICTION: FittedNumber(value=1.0)}, "moved": [FRICTION]}
+        found = told(evidence, sentence="Check the data first: a: b is c. And so on.", **fields)
+        assert headline(found).startswith("Check the data first (below). ")
+
+
+def test_a_number_that_is_off_is_said_though_no_interval_excludes_it():
+    number = FittedNumber(value=1.3, interval=(0.9, 1.8), start=1.0)
+    found = told(PARAMETER, parameters={"motor_torque_gain": number}, moved=["motor_torque_gain"])
+    assert "most simply motor torque gain" in headline(found)
+    sure = sureness(found)
+    assert "not which" in sure.words
+    assert "75\u00a0%" in sure.number  # of GAP, by the re-fit
+
+
+def test_how_far_a_number_moved_is_in_standard_errors_of_its_logarithm():
+    width = 0.02  # standard deviation of the logarithm
+    bounds = (0.04 * np.exp(-2 * width), 0.04 * np.exp(2 * width))
+    number = FittedNumber(value=0.04, interval=bounds, start=0.04 * np.exp(-5 * width))
+    found = told(PARAMETER, parameters={"x": number}, moved=["x"])
+    assert farthest(found.verdict) == pytest.approx(5.0)
+
+
+def test_a_number_without_a_spread_is_infinitely_far_and_does_not_crash():
+    number = FittedNumber(value=0.04, interval=(0.04, 0.04), start=0.03)
+    found = told(PARAMETER, parameters={FRICTION: number}, moved=[FRICTION])
+    assert math.isinf(farthest(found.verdict))
+    assert sureness(found).number == "over 100 standard errors"
