@@ -1,9 +1,11 @@
 """The one kernel behind every signal: pieces in time, each a cubic, a sum of sines, a chirp or a triangle.
 
-Packed parameters: ``n``, the value before the first piece, then four tables of n numbers (start of the
-piece in s; first and last piece of the smooth run that it belongs to; position of its record), then the
-records: kind, followed by the numbers listed at each kind below. Times in a record count from the
-piece's start.
+Packed parameters: ``n``, the value before the first piece, buckets a second, number of buckets, then four
+tables of n numbers (start of the piece in s; first and last piece of the smooth run that it belongs to;
+position of its record), the buckets, then the records: kind, followed by the numbers listed at each kind
+below. Times in a record count from the piece's start. Buckets cut the time between the first and the last
+start evenly; each holds the last piece that has started when it begins, one more number closes them: a piece
+is found by looking between two neighbours, however many thousand knots a measured motion has.
 
 The run is chosen by ``inside``, the piece within the run by ``time``: a solver that looks a little over
 the end of its span sees the current run continued, and a span may cross joints without a jump.
@@ -23,40 +25,49 @@ EXPONENTIAL_CHIRP = 3  #: offset, amplitude, rad/s at the start, growth rate in 
 TRIANGLE = 4  #: offset, amplitude, frequency in Hz; rises from the offset
 
 #: Numbers before the tables.
-HEADER = 2
+HEADER = 4
 
 
 @signal
 def pieces(time: float, inside: float, parameters: Any, values: Any) -> None:
     """Value and three derivatives at ``time`` of the smooth run that holds ``inside``."""
     n = int(parameters[0])
-    if inside < parameters[2]:
+    if inside < parameters[HEADER]:
         values[0] = parameters[1]
         values[1] = 0.0
         values[2] = 0.0
         values[3] = 0.0
         return
-    low = 0
-    high = n
+    starts = HEADER
+    bucket = int((time - parameters[starts]) * parameters[2])
+    bucket = max(min(bucket, int(parameters[3]) - 1), 0)
+    bucket += starts + 4 * n
+    # One piece more on either side: rounding may have put the time into the neighbour.
+    low = max(int(parameters[bucket]) - 1, 0)
+    high = min(int(parameters[bucket + 1]) + 2, n)
     while high - low > 1:
         middle = (low + high) // 2
-        if parameters[2 + middle] <= inside:
+        if parameters[starts + middle] <= time:
             low = middle
         else:
             high = middle
-    first = int(parameters[2 + n + low])
-    last = int(parameters[2 + 2 * n + low])
-    if last > first:
-        low = first
-        high = last + 1
+    first = int(parameters[starts + n + low])
+    last = int(parameters[starts + 2 * n + low])
+    if inside < parameters[starts + first] or (last + 1 < n and inside >= parameters[starts + last + 1]):
+        # The time is over the edge of the run that holds ``inside``.
+        low = 0
+        high = n
         while high - low > 1:
             middle = (low + high) // 2
-            if parameters[2 + middle] <= time:
+            if parameters[starts + middle] <= inside:
                 low = middle
             else:
                 high = middle
-    start = parameters[2 + low]
-    at = int(parameters[2 + 3 * n + low])
+        first = int(parameters[starts + n + low])
+        last = int(parameters[starts + 2 * n + low])
+        low = first if time < parameters[starts + first] else last
+    start = parameters[starts + low]
+    at = int(parameters[starts + 3 * n + low])
     kind = int(parameters[at])
     t = time - start
     if kind == CUBIC:

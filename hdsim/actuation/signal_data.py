@@ -203,15 +203,29 @@ class SignalData:
         ends = np.append(joint[1:], True)
         last = np.minimum.accumulate(np.where(ends, index, n)[::-1])[::-1]
 
-        base = law.HEADER + 4 * n
+        rate, buckets = _buckets(starts)
+        base = law.HEADER + 4 * n + len(buckets)
         lengths = np.concatenate([np.full(len(s.starts), 1 + len(s.rows[0])) for s in segments])
         positions = base + np.concatenate([[0], np.cumsum(lengths)[:-1]])
         records = [
             np.column_stack([np.full(len(s.starts), float(s.kind)), np.asarray(s.rows, dtype=float)]).ravel()
             for s in segments
         ]
-        packed = np.concatenate([[n, self.move.initial], starts, first, last, positions, *records])
+        header = [n, self.move.initial, rate, len(buckets) - 1]
+        packed = np.concatenate([header, starts, first, last, positions, buckets, *records])
         return np.ascontiguousarray(packed, dtype=float), first, starts
+
+
+def _buckets(starts: Array) -> tuple[float, Any]:
+    """Buckets a second, and the last piece that has started at each border: shape (buckets + 1,)."""
+    import numpy as np
+
+    n = len(starts)
+    length = float(starts[-1] - starts[0])
+    if not 0.0 < length < math.inf:
+        return 0.0, np.array([0, n - 1])
+    borders = np.linspace(starts[0], starts[-1], n)
+    return (n - 1) / length, np.searchsorted(starts, borders, side="right") - 1
 
 
 def _peaks(start: float, stop: float, frequency: float) -> Array:

@@ -7,6 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from hdsim.actuation._signal_kernel import CUBIC
+from hdsim.actuation.signal_data import Move, Segment, SignalData
 from hdsim.actuation.signals import AngleTrajectory, TorqueSignal, VelocityTrajectory
 from hdsim.errors import InputError
 
@@ -387,3 +389,25 @@ def test_a_missing_or_binary_file_is_refused(tmp_path):
     path.write_bytes(bytes(range(256)))
     with pytest.raises(InputError, match="UTF-8"):
         read_columns(path, ["time"])
+
+
+def test_pieces_of_any_spacing_are_found_as_by_a_plain_search():
+    """Against SciPy's piecewise polynomials, at and beside every knot: even, clustered and double ones."""
+    from scipy.interpolate import CubicSpline
+
+    rng = np.random.default_rng(4)
+    even = np.linspace(0.3, 2.3, 601)
+    clustered = np.unique(np.concatenate([[0.3, 2.3], 1.0 + 1e-5 * rng.uniform(size=300)]))
+    for starts in (even, clustered, np.unique(rng.uniform(0.3, 2.3, 50)), np.array([0.3, 0.4])):
+        spline = CubicSpline(starts, rng.standard_normal(len(starts)))
+        rows = [tuple(row) for row in spline.c[::-1].T.tolist()]
+        segment = Segment(CUBIC, starts[:-1].tolist(), rows)
+        move = Move((segment,), float(starts[-1]), 0.0, float(spline(starts[-1])))
+        found = SignalData(move)
+        inner = starts[1:-1]
+        times = np.concatenate([starts[:-1], np.nextafter(inner, 9.0), rng.uniform(0.3, starts[-1], 500)])
+        values = found.values(times)
+        for order in range(3):
+            size = np.abs(spline(starts, order)).max()
+            np.testing.assert_allclose(values[order], spline(times, order), rtol=1e-7, atol=1e-9 * size)
+        assert not found.values(np.array([0.1])).any()
