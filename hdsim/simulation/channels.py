@@ -85,6 +85,10 @@ class Observer:
         found: Array = rows[:, a.S_INPUTS + self._columns + row]
         return found
 
+    def least_heat(self, rows: Array) -> tuple[Array, Array]:
+        """Heat (W) of the account of heat that has least, where that is negative (else 0), and its index."""
+        return rows[:, a.S_LEAST_HEAT], rows[:, a.S_LEAST_ACCOUNT]
+
     def motor_torque(self, rows: Array) -> Array:
         """Torque at the motor shaft: the windings', or what a prescribed motion costs, N m."""
         return self.outputs(rows, COMMANDED_TORQUE) + rows[:, a.S_CONSTRAINT]
