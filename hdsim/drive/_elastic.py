@@ -135,7 +135,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     h_mm = result[_mesh.HESSIAN]
     h_mf = result[_mesh.HESSIAN + 1]
     h_mo = result[_mesh.HESSIAN + 2]
-    h_ff = result[_mesh.HESSIAN + 3]
+    # A ring in balance is no coordinate: the rest of the Hessian is its Schur complement.
+    h_ff = 0.0 if ring == RING_STATIC else result[_mesh.HESSIAN + 3]
     h_fo = result[_mesh.HESSIAN + 4]
     h_oo = result[_mesh.HESSIAN + 5]
     # The ports: first derivatives over the angles; second ones exist only through the error.

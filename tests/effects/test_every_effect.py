@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import hdsim.kernel as k
 from hdsim.effects import catalogue
 from hdsim.effects.__main__ import page
+from hdsim.effects.base_flexibility import BaseFlexibility
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
 from hdsim.effects.lugre_friction import LugreFriction
@@ -89,6 +90,7 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     "motor_torque_ripple, phases": (
         MotorTorqueRipple(components=(RippleComponent(order=7, cogging_nm=0.01, share=0.1, phase_deg=30),)),
     ),
+    "base_flexibility, housing": (BaseFlexibility(stiffness_nm_per_rad=3e5, natural_frequency_hz=70),),
     "unbalance, both": (Unbalance(motor_kg_m=1e-4, motor_phase_deg=20, output_phase_deg=-50),),
 }
 MODELS: dict[str, Model] = {}
