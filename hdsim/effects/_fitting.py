@@ -121,6 +121,9 @@ class Fitting:
         turns: least travel of the wave generator, in turns, without which its trace looks like anything.
         covered_by: numbers of a scenario that say the same: where all are above zero the re-fit has had it.
         cumulative: a term has a meaning only on top of those before it, and adds to their fields.
+        follows: measured channels that it takes as they are (``Builder.external``): asked only of records
+            that have them.
+        unless: measured channels that tell more than this way can: not asked of records that have them.
     """
 
     terms: tuple[Amplitude | Inverse | Harmonic | Periodic, ...]
@@ -131,6 +134,8 @@ class Fitting:
     turns: float = 0.0
     covered_by: tuple[str, ...] = ()
     cumulative: bool = False
+    follows: tuple[str, ...] = ()
+    unless: tuple[str, ...] = ()
 
     @property
     def in_series(self) -> bool:

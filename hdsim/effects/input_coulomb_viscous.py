@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from typing import ClassVar
 
 from pydantic import Field
@@ -9,7 +10,7 @@ from pydantic import Field
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.effects._kernels import coulomb_viscous
 from hdsim.kernel import MOTOR_TORQUE
-from hdsim.parts import Builder, Effect, Signature
+from hdsim.parts import INPUT_FRICTION_HEAT, Builder, Effect, InputFriction, Signature
 
 
 class InputCoulombViscous(Effect):
@@ -48,10 +49,8 @@ class InputCoulombViscous(Effect):
 
     def contribute(self, build: Builder) -> None:
         """Add the friction torque to the motor."""
-        numbers = [
-            MOTOR_TORQUE,
-            self.coulomb_nm,
-            self.viscous_nm_s_per_rad,
-            self.smoothing_velocity_rad_per_s,
-        ]
-        build.element(coulomb_viscous, numbers)
+        friction = InputFriction(
+            self.coulomb_nm, self.viscous_nm_s_per_rad, self.smoothing_velocity_rad_per_s
+        )
+        build.element(coulomb_viscous, [MOTOR_TORQUE, *astuple(friction)], heat=INPUT_FRICTION_HEAT)
+        build.declare_input_friction(friction)

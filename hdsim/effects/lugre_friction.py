@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from hdsim.effects._fitting import Amplitude, Fitting, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, STORED, element
-from hdsim.parts import Builder, Effect, Signature, State
+from hdsim.parts import INPUT_FRICTION_HEAT, Builder, Effect, InputFriction, Signature, State
 
 
 @element
@@ -136,4 +136,6 @@ class LugreFriction(Effect):
         state = State(
             "bristle_deflection", "rad", 0.0, size, "mean deflection of the LuGre bristles, motor shaft"
         )
-        build.element(bristles, numbers, states=(state,))
+        build.element(bristles, numbers, states=(state,), heat=INPUT_FRICTION_HEAT)
+        # The bristles' torque depends on how far they are bent: nothing that another part could scale.
+        build.declare_input_friction(InputFriction(0.0, self.viscous_nm_s_per_rad, 1.0))

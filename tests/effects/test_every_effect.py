@@ -15,8 +15,10 @@ from hypothesis import strategies as st
 import hdsim.kernel as k
 from hdsim.effects import catalogue
 from hdsim.effects.__main__ import page
+from hdsim.effects.base_flexibility import BaseFlexibility
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
+from hdsim.effects.load_dependent_loss import LoadDependentLoss
 from hdsim.effects.lugre_friction import LugreFriction
 from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
 from hdsim.effects.thermal_friction import ThermalFriction
@@ -89,6 +91,8 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     "motor_torque_ripple, phases": (
         MotorTorqueRipple(components=(RippleComponent(order=7, cogging_nm=0.01, share=0.1, phase_deg=30),)),
     ),
+    "base_flexibility, housing": (BaseFlexibility(stiffness_nm_per_rad=3e5, natural_frequency_hz=70),),
+    "load_dependent_loss, by direction": (LoadDependentLoss(coefficient=0.2, back_driving_coefficient=0.05),),
     "unbalance, both": (Unbalance(motor_kg_m=1e-4, motor_phase_deg=20, output_phase_deg=-50),),
 }
 MODELS: dict[str, Model] = {}
