@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
 
-from hdsim.effects._fitting import Fitting, Inverse, Shape
+from hdsim.effects._fitting import Fitting, Inverse, Plausible, Shape
 from hdsim.kernel import DISSIPATED, STORED, element
 from hdsim.parts import Builder, Effect, Signature, State
 
@@ -66,13 +66,20 @@ class BaseFlexibility(Effect):
         ),
     )
 
-    stiffness_nm_per_rad: float = Field(5.0e5, gt=0)
+    stiffness_nm_per_rad: Annotated[
+        float, Plausible(2.0, 300.0, "estimate: a mount is stiffer than the drive", of="stiffness_k1")
+    ] = Field(5.0e5, gt=0)
     """Torsional stiffness K_b of the mount about the drive's axis, N m/rad."""
     housing_inertia_kg_m2: float = Field(0.0, ge=0)
     """Inertia J_b of the housing about the drive's axis, kg m^2 (0: it follows at once)."""
-    natural_frequency_hz: float | None = Field(None, gt=0)
+    # Above hearing a housing is no rigid body on a spring.
+    natural_frequency_hz: Annotated[
+        float | None, Plausible(10.0, 300.0, "estimate: robot links and brackets ring there")
+    ] = Field(None, gt=0, le=2e4)
     """The same as the frequency at which the housing alone rings on its mount, Hz; give one of the two."""
-    damping_ratio: float = Field(0.05, ge=0, le=2)
+    damping_ratio: Annotated[float, Plausible(0.005, 0.2, "estimate: bolted steel and aluminium")] = Field(
+        0.05, ge=0, le=2
+    )
     """Damping of the housing alone on its mount, as a share of the critical one."""
 
     @model_validator(mode="after")

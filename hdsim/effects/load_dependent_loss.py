@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, TRANSMITTED_TORQUE, element
 from hdsim.parts import Builder, Effect, Signature
 
@@ -82,9 +82,13 @@ class LoadDependentLoss(Effect):
         ),
     )
 
-    coefficient: float = Field(0.03, ge=0, lt=1)
+    coefficient: Annotated[
+        float, Plausible(5e-3, 0.5, "catalogue efficiencies at rated load, 67 to 85 %, cold ones less")
+    ] = Field(0.03, ge=0, lt=1)
     """Share of the transmitted torque, reduced to the motor, that is lost on top of the drive's own, c_L."""
-    back_driving_coefficient: float | None = Field(None, ge=0, lt=1)
+    back_driving_coefficient: Annotated[
+        float | None, Plausible(5e-3, 0.5, "as c_L; a few percent from it (Matsuki 2019)")
+    ] = Field(None, ge=0, lt=1)
     """The same while the load drives the motor, c_B (null: c_L)."""
     smoothing_torque_nm: float = Field(0.5, gt=0)
     """Output torque tau_s over which |tau| is rounded, N m."""

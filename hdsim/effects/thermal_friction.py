@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting, Shape
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, element
 from hdsim.parts import INPUT_FRICTION_HEAT, Builder, Effect, Signature, State
 
@@ -87,7 +87,10 @@ class ThermalFriction(Effect):
         ),
     )
 
-    heat_capacity_j_per_k: float = Field(450.0, gt=0)
+    heat_capacity_j_per_k: Annotated[
+        float,
+        Plausible(10.0, 5e3, "20 g to 10 kg of steel: the wave generator's bearing alone, or the joint"),
+    ] = Field(450.0, gt=0)
     """Heat capacity C of drive and housing, J/K (about 1 kg of steel)."""
     thermal_resistance_k_per_w: float = Field(1.5, gt=0)
     """Thermal resistance R to the ambient, K/W."""
@@ -97,7 +100,9 @@ class ThermalFriction(Effect):
     """Temperature at the start, degC (null: ambient)."""
     reference_degc: float = Field(20.0, ge=-60, le=150)
     """Temperature T_0 at which the drive's friction is given, degC."""
-    viscosity_coefficient_per_k: float = Field(0.033, ge=0, le=0.2)
+    viscosity_coefficient_per_k: Annotated[
+        float, Plausible(0.01, 0.06, "Palmgren's nu^(2/3) with mineral oils and greases")
+    ] = Field(0.033, ge=0, le=0.2)
     """Relative decay of viscous friction, beta, 1/K."""
     viscous_nm_s_per_rad: float | None = Field(None, ge=0)
     """Part of the motor shaft's viscous friction at T_0 that changes, b, N m s/rad (null or more: all)."""
