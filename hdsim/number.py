@@ -54,15 +54,5 @@ def limits(metadata: Iterable[Any]) -> tuple[float, float]:
     return least, most
 
 
-def plausible(metadata: Iterable[Any]) -> tuple[float, float]:
-    """The range that a field's sources have (metadata with ``low`` and ``high``), within what it allows."""
-    metadata = list(metadata)
-    least, most = limits(metadata)
-    for each in metadata:
-        least = max(least, float(_or(getattr(each, "low", None), least)))
-        most = min(most, float(_or(getattr(each, "high", None), most)))
-    return least, most
-
-
 def _or(value: Any, other: float) -> Any:
     return other if value is None else value

@@ -44,6 +44,27 @@ class State:
 
 
 @dataclass(frozen=True)
+class InputFriction:
+    """Friction on the motor shaft, T = T_c tanh(w/w_s) + b w, that a part has added there.
+
+    A part that changes the friction of others (with temperature, say) must know how much there is of it.
+
+    Args:
+        coulomb_nm: T_c, N m.
+        viscous_nm_s_per_rad: b, N m s/rad.
+        smoothing_velocity_rad_per_s: w_s, rad/s.
+    """
+
+    coulomb_nm: float
+    viscous_nm_s_per_rad: float
+    smoothing_velocity_rad_per_s: float
+
+
+#: Account of the heat of friction on the motor shaft (see ``Builder.element``).
+INPUT_FRICTION_HEAT = "friction on the motor shaft"
+
+
+@dataclass(frozen=True)
 class Signature:
     """The trace that an effect leaves in measured data.
 
@@ -79,8 +100,8 @@ class Builder(Protocol):
     ratio: float
     """Signed ratio motor angle / output angle."""
     rated_torque_nm: float
-    viscous_friction_nm_s_per_rad: float
-    """The drive's own viscous friction at the motor shaft."""
+    input_frictions: Sequence[InputFriction]
+    """Friction on the motor shaft, of the drive and of every part that has declared its own."""
     seed: int
     """Seed of every random number of the run; derive one with ``numpy.random.default_rng([seed, ...])``."""
 
@@ -91,8 +112,33 @@ class Builder(Protocol):
         *,
         states: Sequence[State] = (),
         last: bool = False,
+        heat: str = "",
     ) -> int:
-        """Add an element; returns the index of its first own state. ``last`` runs it after all others."""
+        """Add an element; returns the index of its first own state.
+
+        Args:
+            kernel: the element.
+            parameters: its numbers.
+            states: states of its own.
+            last: runs it after all others.
+            heat: account of its heat; an element that changes another's friction shares that one's account.
+                The heat of an account is never negative, and a run's audit holds it to that. By default
+                every element has its own.
+        """
+
+    def declare_input_friction(self, friction: InputFriction) -> None:
+        """Tell the other parts of friction that an element adds on the motor shaft."""
+
+    def housing(self, own: int, inertia_kg_m2: float) -> None:
+        """Let the housing turn: its angle is the part's state ``inputs[own]``, its speed ``inputs[own + 1]``.
+
+        The mesh then sees every angle from there, and its reaction, over the inertia, is added to the rate of
+        that speed; whatever else acts on the housing is the part's own. A rigid mesh has no compliance: its
+        housing stands still.
+
+        Raises:
+            InputError: the model has a moving housing already.
+        """
 
     def twist(self, kernel: Kernel, parameters: Sequence[float] | Array) -> None:
         """Add a contribution to the mesh twist (kinematic error and its kin)."""
@@ -107,6 +153,12 @@ class Builder(Protocol):
         """Register a signal (``hdsim.actuation.signals``); returns the column of its value in the inputs.
 
         The next three columns hold its first three derivatives.
+        """
+
+    def external(self, name: str) -> int | None:
+        """Column of a signal that whoever runs the model provides by name; None when it does not.
+
+        ``temperature``: measured temperature of the drive, degC. Derivatives follow as for ``signal``.
         """
 
     def state_index(self, name: str) -> int | None:

@@ -11,6 +11,8 @@ from hdsim.drive._layout import (
     COLUMNS,
     ENERGIES,
     GAIN,
+    HOUSING,
+    HOUSING_INERTIA,
     INERTIA,
     INVERSE_RATIO,
     KAPPA,
@@ -26,11 +28,13 @@ from hdsim.drive._layout import (
     S_ANGLES,
     S_CONSTRAINT,
     S_ERROR,
+    S_HOUSING,
     S_INPUTS,
     S_KINETIC,
     S_MESH,
     S_MESH_1,
     S_POTENTIAL,
+    S_RELATIVE,
     S_RING_1,
     S_TWIST_1,
     S_VELOCITIES,
@@ -64,7 +68,7 @@ _jit: Any = compiled
 @_jit
 def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
     """Ring angle at which mesh and structure balance: safeguarded Newton on the convex potential."""
-    angles = scratch[S_ANGLES : S_ANGLES + 3]
+    angles = scratch[S_RELATIVE : S_RELATIVE + 3]
     error = scratch[S_ERROR : S_ERROR + 6]
     result = scratch[S_MESH : S_MESH + _mesh.RESULT_SIZE]
     parameters = reals[integers[MESH_AT] :]
@@ -103,17 +107,24 @@ def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
     result[_mesh.HESSIAN + 1] = 0.0
     result[_mesh.HESSIAN + 4] = 0.0
     result[_mesh.GRADIENT + 1] = 0.0
-    scratch[S_VELOCITIES + 1] = (
-        scratch[S_RING_1] * scratch[S_VELOCITIES] + scratch[S_RING_1 + 2] * scratch[S_VELOCITIES + 2]
+    scratch[S_RELATIVE + 4] = (
+        scratch[S_RING_1] * scratch[S_RELATIVE + 3] + scratch[S_RING_1 + 2] * scratch[S_RELATIVE + 5]
     )
+    scratch[S_ANGLES + 1] = scratch[S_RELATIVE + 1] + scratch[S_HOUSING]
+    scratch[S_VELOCITIES + 1] = scratch[S_RELATIVE + 4] + scratch[S_HOUSING + 1]
 
 
 @_jit
 def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
-    """Right-hand side with a compliant mesh."""
+    """Right-hand side with a compliant mesh.
+
+    Mesh, kinematic error and ports see the angles from the housing, theta_a - b. So the housing's row is
+    minus the sum of the three bodies' rows, in torques and in derivatives alike.
+    """
     read_coordinates(t, y, integers, reals, scratch)
     read_error(integers, reals, scratch)
-    angles = scratch[S_ANGLES : S_ANGLES + 3]
+    angles = scratch[S_RELATIVE : S_RELATIVE + 3]
+    seen = scratch[S_RELATIVE + 3 : S_RELATIVE + 6]
     velocities = scratch[S_VELOCITIES : S_VELOCITIES + 3]
     error = scratch[S_ERROR : S_ERROR + 6]
     result = scratch[S_MESH : S_MESH + _mesh.RESULT_SIZE]
@@ -125,7 +136,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     h_mm = result[_mesh.HESSIAN]
     h_mf = result[_mesh.HESSIAN + 1]
     h_mo = result[_mesh.HESSIAN + 2]
-    h_ff = result[_mesh.HESSIAN + 3]
+    # A ring in balance is no coordinate: the rest of the Hessian is its Schur complement.
+    h_ff = 0.0 if ring == RING_STATIC else result[_mesh.HESSIAN + 3]
     h_fo = result[_mesh.HESSIAN + 4]
     h_oo = result[_mesh.HESSIAN + 5]
     # The ports: first derivatives over the angles; second ones exist only through the error.
@@ -157,8 +169,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     twist_rate = 0.0
     mesh_rate = 0.0
     for a in range(3):
-        twist_rate += torsion[a] * velocities[a]
-        mesh_rate += meshing[a] * velocities[a]
+        twist_rate += torsion[a] * seen[a]
+        mesh_rate += meshing[a] * seen[a]
     fill_inputs(t, integers, scratch, -result[_mesh.GRADIENT + 2], twist, twist_rate, mesh_twist, mesh_rate)
     run_elements(integers, reals, scratch)
 
@@ -168,6 +180,13 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     kinetic = 0.0
     supplied = outputs[SUPPLIED]
     delivered = outputs[DELIVERED]
+    housing = integers[HOUSING]
+    if housing > 0:
+        reaction = 0.0
+        for a in range(3):
+            reaction -= outputs[TWIST_TORQUE] * torsion[a] + outputs[MESH_TORQUE] * meshing[a]
+            reaction += result[_mesh.GRADIENT + a]
+        outputs[housing + 1] += reaction / reals[HOUSING_INERTIA]
     for a in range(3):
         if ring != RING_DYNAMIC and a == 1:
             continue
@@ -208,8 +227,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     # Fold the dependent columns into those of the angles and velocities.
     at = S_INPUTS + columns + rows
     full = scratch[at : at + rows * columns]
-    vm = velocities[0]
-    vo = velocities[2]
+    vm = seen[0]
+    vo = seen[2]
     bent_m = error[3] * vm + error[4] * vo
     bent_o = error[4] * vm + error[5] * vo
     for r in range(rows):
@@ -219,7 +238,12 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         d_rate = row[TWIST_RATE]
         d_mesh = row[MESH_TWIST]
         d_mesh_rate = row[MESH_TWIST_RATE]
+        by_angles = row[MOTOR_ANGLE] + row[OUTPUT_ANGLE]
+        if ring != RING_STATIC:
+            by_angles += row[RING_ANGLE]
+        by_velocities = row[MOTOR_ANGLE + 1] + row[RING_ANGLE + 1] + row[OUTPUT_ANGLE + 1]
         if ring == RING_STATIC:
+            # The ring stands at the housing's angle plus what mesh and structure make of the others.
             row[MOTOR_ANGLE] += row[RING_ANGLE] * scratch[S_RING_1]
             row[OUTPUT_ANGLE] += row[RING_ANGLE] * scratch[S_RING_1 + 2]
         for a in range(3):
@@ -229,22 +253,35 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         row[MOTOR_ANGLE] += bent * bent_m - d_tau * h_mo
         row[OUTPUT_ANGLE] += bent * bent_o - d_tau * h_oo
         row[RING_ANGLE] -= d_tau * h_fo
+        if housing > 0:
+            # What came in through the mesh depends on the angles as seen from the housing.
+            row[housing] += by_angles - row[MOTOR_ANGLE] - row[OUTPUT_ANGLE]
+            row[housing] += row[RING_ANGLE] if ring == RING_STATIC else -row[RING_ANGLE]
+            row[housing + 1] += by_velocities
+            row[housing + 1] -= row[MOTOR_ANGLE + 1] + row[RING_ANGLE + 1] + row[OUTPUT_ANGLE + 1]
     # Torque rows: the ports' rows through their levers, then the potential.
+    bent = outputs[TWIST_TORQUE] * curved_torsion + outputs[MESH_TORQUE] * curved_mesh
+    slopes = (
+        (bent * error[3] - h_mm, -h_mf, bent * error[4] - h_mo),
+        (-h_mf, -h_ff, -h_fo),
+        (bent * error[4] - h_mo, -h_fo, bent * error[5] - h_oo),
+    )
     for a in range(3):
+        through = slopes[a][0] + slopes[a][1] + slopes[a][2]
         for c in range(columns):
-            full[a * columns + c] += (
+            by_ports = (
                 torsion[a] * full[TWIST_TORQUE * columns + c] + meshing[a] * full[MESH_TORQUE * columns + c]
             )
-    bent = outputs[TWIST_TORQUE] * curved_torsion + outputs[MESH_TORQUE] * curved_mesh
-    full[MOTOR_ANGLE] += bent * error[3] - h_mm
-    full[RING_ANGLE] -= h_mf
-    full[OUTPUT_ANGLE] += bent * error[4] - h_mo
-    full[columns + MOTOR_ANGLE] -= h_mf
-    full[columns + RING_ANGLE] -= h_ff
-    full[columns + OUTPUT_ANGLE] -= h_fo
-    full[2 * columns + MOTOR_ANGLE] += bent * error[4] - h_mo
-    full[2 * columns + RING_ANGLE] -= h_fo
-    full[2 * columns + OUTPUT_ANGLE] += bent * error[5] - h_oo
+            full[a * columns + c] += by_ports
+            if housing > 0:
+                full[(housing + 1) * columns + c] -= by_ports / reals[HOUSING_INERTIA]
+        for b in range(3):
+            full[a * columns + 2 * b] += slopes[a][b]
+            if housing > 0:
+                full[(housing + 1) * columns + 2 * b] -= slopes[a][b] / reals[HOUSING_INERTIA]
+        if housing > 0:
+            full[a * columns + housing] -= through
+            full[(housing + 1) * columns + housing] += through / reals[HOUSING_INERTIA]
     # Powers of the constraints, which only the energies read: T = J alpha - Q.
     for a in range(3):
         if integers[SIGNAL_OF + a] < 0 or integers[ENERGIES] == 0:

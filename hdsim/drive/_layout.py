@@ -16,7 +16,12 @@ INTEGERS = 11
 STATE_OF = 12  # three: index of a coordinate's angle in y, or -1
 SIGNAL_OF = 15  # three: column of the signal that prescribes a coordinate, or -1
 ENERGIES = 18  # number of trailing energy states: 3 with the audit, 0 without
-LISTS = 20  # elements (address, parameters, own), twists (address, parameters), signals (address, parameters)
+ACCOUNTS = 19  # of heat: 0 without the audit
+HOUSING = 20  # column of the housing's angle in the inputs, or 0
+LISTS = 21  # elements (address, parameters, own, account), twists and signals (address, parameters)
+PER_ELEMENT = 4
+PER_TWIST = 2
+PER_SIGNAL = 2
 
 RING_DYNAMIC = 0
 RING_STATIC = 1
@@ -31,6 +36,7 @@ GAIN = 5
 OUTPUT_SHARE = 6
 KAPPA = 7
 LAMBDA = 8  # three
+HOUSING_INERTIA = 11
 PARAMETERS = 16
 
 # Scratch, from its end of fixed size: found at the same place for every model.
@@ -45,4 +51,8 @@ S_RING_1 = 38  # of the eliminated ring angle
 S_KINETIC = 41
 S_POTENTIAL = 42
 S_CONSTRAINT = 43  # three: torque that the prescription of a coordinate costs
-S_INPUTS = 48
+S_LEAST_HEAT = 46  # heat of the account that has least, if negative, W
+S_LEAST_ACCOUNT = 47
+S_HOUSING = 48  # angle and velocity
+S_RELATIVE = 50  # three angles and three velocities as seen from the housing
+S_INPUTS = 56  # then outputs, Jacobian, and the heat of each account

@@ -21,6 +21,7 @@ from hdsim.drive._layout import (
     S_KINETIC,
     S_MESH,
     S_POTENTIAL,
+    S_RELATIVE,
     S_VELOCITIES,
     SIGNAL_OF,
     STATE_OF,
@@ -52,10 +53,14 @@ def rigid_output(integers, reals, scratch):  # type: ignore[no-untyped-def]
     angles = scratch[S_ANGLES : S_ANGLES + 3]
     error = scratch[S_ERROR : S_ERROR + 6]
     inverse = reals[INVERSE_RATIO]
+    # Without compliance the housing stands still.
+    seen = scratch[S_RELATIVE : S_RELATIVE + 3]
     angles[2] = angles[0] * inverse
+    seen[0], seen[2] = angles[0], angles[2]
     for _ in range(6):
         read_error(integers, reals, scratch)
         angles[2] = angles[0] * inverse + error[0]
+        seen[2] = angles[2]
     read_error(integers, reals, scratch)
     c = (inverse + error[1]) / (1.0 - error[2])
     return c, (error[3] + 2.0 * error[4] * c + error[5] * c * c) / (1.0 - error[2])

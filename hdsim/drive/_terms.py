@@ -7,18 +7,27 @@ from typing import Any
 from hdsim._abi import call_element, call_signal, call_twist
 from hdsim._compile import compiled
 from hdsim.drive._layout import (
+    ACCOUNTS,
     COLUMNS,
     ELEMENTS,
     ENERGIES,
+    HOUSING,
     INERTIA,
     INSIDE,
     LAMBDA,
     LISTS,
     OWN_STATES,
+    PER_ELEMENT,
+    PER_SIGNAL,
+    PER_TWIST,
     S_ACCELERATIONS,
     S_ANGLES,
     S_ERROR,
+    S_HOUSING,
     S_INPUTS,
+    S_LEAST_ACCOUNT,
+    S_LEAST_HEAT,
+    S_RELATIVE,
     S_VELOCITIES,
     SIGNAL_OF,
     SIGNALS,
@@ -47,14 +56,14 @@ def read_coordinates(t, y, integers, reals, scratch):  # type: ignore[no-untyped
     """Signals, angles, velocities, prescribed accelerations and own states into the scratch."""
     own = integers[OWN_STATES]
     first_signal = S_INPUTS + OWN + own
-    at = LISTS + 3 * integers[ELEMENTS] + 2 * integers[TWISTS]
+    at = LISTS + PER_ELEMENT * integers[ELEMENTS] + PER_TWIST * integers[TWISTS]
     for k in range(integers[SIGNALS]):
         column = first_signal + 4 * k
         call_signal(
-            integers[at + 2 * k],
+            integers[at + PER_SIGNAL * k],
             t,
             reals[INSIDE],
-            reals[integers[at + 2 * k + 1] :],
+            reals[integers[at + PER_SIGNAL * k + 1] :],
             scratch[column : column + 4],
         )
     scratch[S_ANGLES] = 0.0
@@ -75,20 +84,32 @@ def read_coordinates(t, y, integers, reals, scratch):  # type: ignore[no-untyped
     last = integers[STATES] - integers[ENERGIES]
     for k in range(own):
         scratch[S_INPUTS + OWN + k] = y[last - own + k]
+    see_from_housing(integers, scratch)
+
+
+@_jit
+def see_from_housing(integers, scratch):  # type: ignore[no-untyped-def]
+    """The housing's motion, and angles and velocities as seen from it: what mesh and kinematic error see."""
+    housing = integers[HOUSING]
+    for k in range(2):
+        turned = scratch[S_INPUTS + housing + k] if housing > 0 else 0.0
+        scratch[S_HOUSING + k] = turned
+        for a in range(3):
+            scratch[S_RELATIVE + 3 * k + a] = scratch[S_ANGLES + 3 * k + a] - turned
 
 
 @_jit
 def read_error(integers, reals, scratch):  # type: ignore[no-untyped-def]
-    """Kinematic error and its derivatives at the current angles."""
+    """Kinematic error and its derivatives at the current angles, seen from the housing."""
     error = scratch[S_ERROR : S_ERROR + 6]
     error[:] = 0.0
-    at = LISTS + 3 * integers[ELEMENTS]
+    at = LISTS + PER_ELEMENT * integers[ELEMENTS]
     for k in range(integers[TWISTS]):
         call_twist(
-            integers[at + 2 * k],
-            scratch[S_ANGLES],
-            scratch[S_ANGLES + 2],
-            reals[integers[at + 2 * k + 1] :],
+            integers[at + PER_TWIST * k],
+            scratch[S_RELATIVE],
+            scratch[S_RELATIVE + 2],
+            reals[integers[at + PER_TWIST * k + 1] :],
             error,
         )
 
@@ -110,17 +131,22 @@ def fill_inputs(t, integers, scratch, transmitted, twist, twist_rate, mesh_twist
 
 @_jit
 def run_elements(integers, reals, scratch):  # type: ignore[no-untyped-def]
-    """Clear outputs and Jacobian, then let every element add to them."""
+    """Clear outputs and Jacobian, then let each element add to them; keeps the least heat of an account."""
     columns = integers[COLUMNS]
     rows = OWN + integers[OWN_STATES]
     at = S_INPUTS + columns
     inputs = scratch[S_INPUTS:at]
     outputs = scratch[at : at + rows]
     jacobian = scratch[at + rows : at + rows + rows * columns]
+    heats = scratch[at + rows + rows * columns :]
     outputs[:] = 0.0
     jacobian[:] = 0.0
+    accounts = integers[ACCOUNTS]
+    for k in range(accounts):
+        heats[k] = 0.0
     for k in range(integers[ELEMENTS]):
-        entry = LISTS + 3 * k
+        entry = LISTS + PER_ELEMENT * k
+        before = outputs[DISSIPATED]
         call_element(
             integers[entry],
             inputs,
@@ -130,6 +156,13 @@ def run_elements(integers, reals, scratch):  # type: ignore[no-untyped-def]
             outputs,
             jacobian,
         )
+        if accounts > 0:
+            heats[integers[entry + 3]] += outputs[DISSIPATED] - before
+    scratch[S_LEAST_HEAT] = 0.0
+    for k in range(accounts):
+        if heats[k] < scratch[S_LEAST_HEAT]:
+            scratch[S_LEAST_HEAT] = heats[k]
+            scratch[S_LEAST_ACCOUNT] = k
 
 
 @_jit

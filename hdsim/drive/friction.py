@@ -17,6 +17,7 @@ from hdsim.kernel import (
     TWIST_TORQUE,
     element,
 )
+from hdsim.parts import INPUT_FRICTION_HEAT, InputFriction
 
 if TYPE_CHECKING:
     from hdsim.drive.parameters import Friction
@@ -64,12 +65,11 @@ def mesh_damping(inputs, parameters, own, columns, outputs, jacobian):  # type: 
 
 def contribute_friction(build: Builder, friction: Friction) -> None:
     """Add the input's friction: T_in = T_out / i (1 + c_L) + T_c + b w while driving."""
+    coulomb, viscous = friction.coulomb_nm, friction.viscous_nm_s_per_rad
+    smoothing = friction.smoothing_velocity_rad_per_s
     build.element(
         input_friction,
-        [
-            friction.coulomb_nm,
-            friction.viscous_nm_s_per_rad,
-            friction.load_coefficient / abs(build.ratio),
-            friction.smoothing_velocity_rad_per_s,
-        ],
+        [coulomb, viscous, friction.load_coefficient / abs(build.ratio), smoothing],
+        heat=INPUT_FRICTION_HEAT,
     )
+    build.declare_input_friction(InputFriction(coulomb, viscous, smoothing))

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.drive import friction
+from hdsim.drive.contributed import Contributed, Contributions
 from hdsim.drive.parameters import Drive, LumpedMesh, RigidMesh, TabulatedMesh, TeethMesh
 from hdsim.errors import InputError
 from hdsim.kernel import OWN, SIGNAL_VALUES, Kernel
 
 if TYPE_CHECKING:
     from hdsim.drive.toothed import Teeth
-    from hdsim.parts import Part, State
+    from hdsim.parts import Part
     from hdsim.simulation.system import System
 
 Array = NDArray[np.float64]
@@ -25,20 +25,7 @@ Array = NDArray[np.float64]
 COORDINATES = ("motor", "ring", "output")
 
 
-@dataclass
-class _Contributions:
-    """What the parts have handed in during one pass."""
-
-    elements: list[tuple[Kernel, Array, int, bool]] = field(default_factory=list)
-    twists: list[tuple[Kernel, Array]] = field(default_factory=list)
-    signals: list[Any] = field(default_factory=list)
-    states: list[State] = field(default_factory=list)
-    wind_ups: list[Callable[[Array], Array]] = field(default_factory=list)
-    sensors: dict[str, list[Any]] = field(default_factory=dict)
-    half_gap_rad: float = 0.0
-
-
-class Model:
+class Model(Contributed):
     """A drive with its parts; the ``Builder`` that parts contribute to.
 
     Args:
@@ -46,13 +33,18 @@ class Model:
         parts: effects, load, controllers: anything with ``contribute``.
         load_inertia_kg_m2: inertia on the output, kg m^2.
         motions: signals that prescribe ``motor`` or ``output`` angles (rad).
+        signals: what else is known over time, by name, for parts that ask for it (``Builder.external``):
+            ``temperature``, degC.
         seed: seed of the random tooth surfaces and of all noise.
-        audited: the energies supplied, delivered and dissipated are states, which the energy audit needs.
+        audited: the energies supplied, delivered and dissipated are states, and every part's heat has its
+            account: what the energy audit needs.
 
     Attributes:
         system: the ODE, a ``hdsim.simulation.system.System``.
         states: the parts' own states in their order in the state vector.
         teeth: gaps, pitch errors and contact table of the toothed meshes, else None.
+        heat_accounts: names of the accounts of heat, in the order of the compiled code; none without audit.
+        input_frictions: friction on the motor shaft, of the drive and the parts.
     """
 
     def __init__(
@@ -62,78 +54,39 @@ class Model:
         *,
         load_inertia_kg_m2: float,
         motions: dict[str, Any] | None = None,
+        signals: Mapping[str, Any] | None = None,
         seed: int = 0,
         audited: bool = True,
     ) -> None:
+        super().__init__()
         self.drive = drive
         self.audited = audited
         self.parts = tuple(parts)
         self.ratio = drive.ratio
         self.rated_torque_nm = drive.rated_torque_nm
-        self.viscous_friction_nm_s_per_rad = drive.friction.viscous_nm_s_per_rad
-        self.coulomb_friction_nm = drive.friction.coulomb_nm
         self.seed = seed
         self.motions = dict(motions or {})
+        self._offered = dict(signals or {})
         self.load_inertia_kg_m2 = load_inertia_kg_m2
         self.teeth: Teeth | None = None
-        self._own_before = 0
-        self._names: dict[str, int] = {}
-        # The signals' columns follow the own states, whose number is known only after a first pass.
+        # The signals' columns follow the own states, whose number is known only after a first pass; so is the
+        # friction of all parts.
         for _ in range(2):
-            self._given = _Contributions()
+            self._given = Contributions()
             self.motion_columns = {name: self.signal(motion) for name, motion in self.motions.items()}
             self._contribute_drive()
             for part in self.parts:
                 part.contribute(self)
             self._own_before = len(self._given.states)
             self._names = {state.name: OWN + k for k, state in enumerate(self._given.states)}
+            self.input_frictions = tuple(self._given.input_frictions)
         if len(self._names) < len(self._given.states):
             raise InputError("two parts of the model add a state of the same name")
         self.states = tuple(self._given.states)
         self.signals = tuple(self._given.signals)
         self.sensors = self._given.sensors
+        self.heat_accounts = tuple(self._given.heat_accounts) if audited else ()
         self.system = self._assemble()
-
-    # What parts may call (``hdsim.parts.Builder``).
-
-    def element(
-        self,
-        kernel: Kernel,
-        parameters: Sequence[float] | Array,
-        *,
-        states: Sequence[State] = (),
-        last: bool = False,
-    ) -> int:
-        """Add an element; see ``hdsim.parts.Builder.element``."""
-        first = OWN + len(self._given.states)
-        self._given.states.extend(states)
-        self._given.elements.append((kernel, np.asarray(parameters, dtype=np.float64), first, last))
-        return first
-
-    def twist(self, kernel: Kernel, parameters: Sequence[float] | Array) -> None:
-        """Add a contribution to the mesh twist."""
-        self._given.twists.append((kernel, np.asarray(parameters, dtype=np.float64)))
-
-    def series_compliance(self, wind_up: Callable[[Array], Array]) -> None:
-        """Put a spring in series with the torsion spring."""
-        self._given.wind_ups.append(wind_up)
-
-    def widen_gap(self, half_gap_rad: float) -> None:
-        """Add to the half-gap of the mesh (rad at the output)."""
-        self._given.half_gap_rad += half_gap_rad
-
-    def signal(self, signal: Any) -> int:
-        """Register a signal; returns the column of its value."""
-        self._given.signals.append(signal)
-        return OWN + self._own_before + SIGNAL_VALUES * (len(self._given.signals) - 1)
-
-    def state_index(self, name: str) -> int | None:
-        """Index in the inputs of a part's state, or None."""
-        return self._names.get(name)
-
-    def sensor(self, channel: str, sensor: Any) -> None:
-        """Put a sensor between a channel and its reader."""
-        self._given.sensors.setdefault(channel, []).append(sensor)
 
     # The drive's own part.
 
@@ -241,9 +194,9 @@ class Model:
         lists: list[int] = []
         ordered = sorted(given.elements, key=lambda entry: entry[3])
         self.element_places: list[tuple[Kernel, int]] = []
-        for element_kernel, parameters, own, _ in ordered:
+        for element_kernel, parameters, own, _, account in ordered:
             at = place(parameters)
-            lists += [element_kernel.address, at, own]
+            lists += [element_kernel.address, at, own, account]
             self.element_places.append((element_kernel, at))
         for twist_kernel, parameters in given.twists:
             lists += [twist_kernel.address, place(parameters)]
@@ -258,6 +211,9 @@ class Model:
         head_integers[a.ELEMENTS] = len(given.elements)
         head_integers[a.TWISTS] = len(given.twists)
         head_integers[a.COLUMNS] = columns
+        head_integers[a.ACCOUNTS] = len(self.heat_accounts)
+        if given.housing is not None and not self.rigid:
+            head_integers[a.HOUSING], head[a.HOUSING_INERTIA] = given.housing
         head_integers[a.STATE_OF : a.STATE_OF + 3] = -1
         head_integers[a.SIGNAL_OF : a.SIGNAL_OF + 3] = -1
         self.place_of = {name: 2 * k for k, name in enumerate(free)}
@@ -276,7 +232,7 @@ class Model:
             else:
                 toothed = isinstance(self.drive.mesh, TeethMesh | TabulatedMesh)
                 head_integers[a.RING] = a.RING_STATIC if toothed else a.RING_ABSENT
-        scratch = a.S_INPUTS + columns + rows + rows * columns
+        scratch = a.S_INPUTS + columns + rows + rows * columns + len(self.heat_accounts)
         head_integers[a.REALS] = length
         head_integers[a.SCRATCH] = scratch
         head_integers[a.INTEGERS] = a.LISTS + len(lists)

@@ -6,7 +6,19 @@ import inspect
 from typing import Any
 
 from hdsim.effects import catalogue
+from hdsim.effects._plausible import Plausible, Scale
 from hdsim.parts import Effect, Parameters
+
+#: Numbers of the drive that a usual range is a multiple of, in words.
+_SCALES: dict[Scale, str] = {
+    "rated_torque": "T_N",
+    "motor_rated_torque": "T_N/i",
+    "per_rated_torque": "1/T_N",
+    "per_motor_rated_torque": "i/T_N",
+    "stiffness_k1": "K1",
+    "motor_stiffness_k1": "K1/i^2",
+    "cubic_stiffness": "K1^3/T_N^2",
+}
 
 HEAD = """\
 # Effects
@@ -25,6 +37,9 @@ Torques act on the named body. `theta_m` is the motor's angle, `theta_l` the out
 dissipative and every spring stores what it takes: the tests check it for each effect at random states, and
 its derivatives too. sign(w) of speed-dependent friction is `tanh(w / smoothing velocity)`: below that speed
 the drive creeps instead of sticking; LuGre friction and hysteresis have states instead and stick.
+
+*Usually* is where an engineer expects a number before a measurement, no bound; T_N is the rated torque, K1
+the drive's first stiffness. What no number can be, the field refuses.
 
 A new effect is a new file with one subclass of `hdsim.parts.Effect`. This page is printed by
 `python -m hdsim.effects`.
@@ -47,9 +62,10 @@ def section(name: str, kind: type[Effect]) -> str:
     for part in _parts(kind):
         if part is not kind:
             lines += [f"`{part.__name__}`: {inspect.getdoc(part)}", ""]
-        lines += ["| parameter | default | meaning |", "|---|---|---|"]
+        lines += ["| parameter | default | usually | meaning |", "|---|---|---|---|"]
         lines += [
-            f"| `{field}` | {_default(info)} | {' '.join((info.description or '').split())} |"
+            f"| `{field}` | {_default(info)} | {_usually(info)} | "
+            f"{' '.join((info.description or '').split())} |"
             for field, info in part.model_fields.items()
         ]
         lines += [""]
@@ -78,6 +94,15 @@ def _default(info: Any) -> str:
     if isinstance(value, tuple):
         return "<br>".join(_short(item) for item in value) or "none"
     return _short(value)
+
+
+def _usually(info: Any) -> str:
+    """The plausible range that the field declares, with its source."""
+    for note in info.metadata:
+        if isinstance(note, Plausible):
+            of = f" times {_SCALES[note.of]}" if note.of else ""
+            return f"{note.low:g} to {note.high:g}{of} ({note.source})"
+    return ""
 
 
 def _short(value: Any) -> str:

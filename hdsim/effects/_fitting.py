@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from hdsim.effects._plausible import Plausible, Range, range_of, scales_of
 from hdsim.effects._terms import (
     INSIDE,
     LIMIT,
@@ -31,7 +32,21 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["WIDER", "Amplitude", "Fitting", "Harmonic", "Inverse", "Limits", "Periodic", "Ranged", "Shape"]
+__all__ = [
+    "WIDER",
+    "Amplitude",
+    "Fitting",
+    "Harmonic",
+    "Inverse",
+    "Limits",
+    "Periodic",
+    "Plausible",
+    "Range",
+    "Ranged",
+    "Shape",
+    "range_of",
+    "scales_of",
+]
 
 #: Ratio to the next start that a lone one would have, and of the widths of a play that are tried.
 ALONE, WIDER = 6.0, 3.0
@@ -148,6 +163,9 @@ class Fitting:
         turns: least travel of the wave generator, in turns, without which its trace looks like anything.
         covered_by: numbers of a scenario that say the same: where all are above zero the re-fit has had it.
         cumulative: a term has a meaning only on top of those before it, and adds to their fields.
+        follows: measured channels that it takes as they are (``Builder.external``): asked only of records
+            that have them.
+        unless: measured channels that tell more than this way can: not asked of records that have them.
     """
 
     terms: tuple[Term, ...]
@@ -158,6 +176,8 @@ class Fitting:
     turns: float = 0.0
     covered_by: tuple[str, ...] = ()
     cumulative: bool = False
+    follows: tuple[str, ...] = ()
+    unless: tuple[str, ...] = ()
 
     @property
     def in_series(self) -> bool:
@@ -240,6 +260,12 @@ class Fitting:
         for shape, value, deviation in zip(self.shapes, shapes, deviations, strict=True):
             found[shape.path] = shape.report(value, float(deviation))
         return found
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Every field that a fit of it moves, phases and other angles included."""
+        found = [path for term in self.terms for path in term.paths()]
+        return tuple(dict.fromkeys([*found, *(shape.path for shape in self.shapes)]))
 
     def items(self, section: str) -> list[Any]:
         """Items that a list of the effect has before periodic terms add theirs."""

@@ -70,6 +70,10 @@ class Term:
         """Least and largest value of each coefficient."""
         return (-math.inf, math.inf) if self.may_be_negative() else (0.0, math.inf)
 
+    def paths(self) -> tuple[str, ...]:
+        """Fields that it moves, phases included; those of a list's items as of its first."""
+        raise NotImplementedError
+
     def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
         """Write its fields into an effect's settings.
 
@@ -132,6 +136,10 @@ class Amplitude(Term):
     of_range: str = ""
     play: bool = False
 
+    def paths(self) -> tuple[str, ...]:
+        """All that have a unit."""
+        return tuple(self.units)
+
     def may_be_negative(self) -> bool:
         """As declared."""
         return self.signed
@@ -188,6 +196,10 @@ class Inverse(Term):
         """The stiffness."""
         return self.path
 
+    def paths(self) -> tuple[str, ...]:
+        """The stiffness."""
+        return (self.path,)
+
     def bounds(self, limits: Limits) -> tuple[float, float]:
         """A stiffness at its lower limit is the largest compliance."""
         low, high = limits(self.path)
@@ -221,6 +233,10 @@ class Harmonic(Term):
     amplitude: str
     phase: str
     unit: float
+
+    def paths(self) -> tuple[str, ...]:
+        """Amplitude and phase."""
+        return (self.amplitude, self.phase)
 
     def count(self, orders: Values) -> int:
         """Of the sine and of the cosine."""
@@ -276,6 +292,10 @@ class Periodic(Term):
     channel: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     besides: tuple[float, ...] = ()
+
+    def paths(self) -> tuple[str, ...]:
+        """Amplitude and phase of the first item."""
+        return (f"{self.section}.0.{self.amplitude}", f"{self.section}.0.phase_deg")
 
     def count(self, orders: Values) -> int:
         """Two for each order."""

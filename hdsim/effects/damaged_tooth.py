@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting, Shape
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.effects._kernels import ARCMIN
 from hdsim.kernel import twist
 from hdsim.number import FIXED
@@ -61,7 +61,7 @@ class DamagedTooth(Effect):
             (Amplitude({"amplitude_arcmin": 0.2}, signed=True),),
             shapes=(
                 Shape("position_deg", tuple(30.0 * k + 15.0 for k in range(12 // lobes)), linear=True),
-                Shape("width_deg", (12.0,)),
+                Shape("width_deg", (12.0,), most=30.0),
             ),
             settings={"passes_per_turn": lobes, "member": member},
             label=label,
@@ -75,9 +75,16 @@ class DamagedTooth(Effect):
         )
     )
 
-    amplitude_arcmin: float = -0.2
+    # A degree is more than the pitch of the finest teeth.
+    amplitude_arcmin: Annotated[
+        float, Plausible(0.02, 3.0, "up to the kinematic error of a coarse drive")
+    ] = Field(-0.2, ge=-60, le=60)
     """Height of the bump as an angle at the output, arcmin (negative: material is missing)."""
-    width_deg: Annotated[float, FIXED] = Field(8.0, gt=0, le=60)
+    # The arc of a lobe that carries load, 30 % of the teeth on two arcs, is 54 degrees wide: a tooth is felt
+    # within 27 degrees of the major axis. A wider bump is a harmonic of low order, another effect.
+    width_deg: Annotated[float, FIXED, Plausible(1.0, 20.0, "one tooth's way through the mesh")] = Field(
+        8.0, gt=0, le=30
+    )
     """Standard deviation s of the bump, degrees of the wave generator."""
     position_deg: Annotated[float, FIXED] = 0.0
     """Angle of the wave generator, at zero output angle, at which lobe 1 is on the tooth, degrees."""

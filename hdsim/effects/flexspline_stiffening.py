@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Fitting, Inverse, Shape
+from hdsim.effects._fitting import Fitting, Inverse, Plausible, Shape
 from hdsim.parts import Builder, Effect, Signature
 
 if TYPE_CHECKING:
@@ -42,9 +42,14 @@ class FlexsplineStiffening(Effect):
         ),
     )
 
-    stiffness_nm_per_rad: float = Field(1.0e5, gt=0)
+    stiffness_nm_per_rad: Annotated[
+        float, Plausible(1.0, 300.0, "estimate: in series with a drive of K1", of="stiffness_k1")
+    ] = Field(1.0e5, gt=0)
     """Stiffness K_0 at zero torque, at the output, N m/rad."""
-    coefficient_per_nm: float = Field(0.02, gt=0)
+    coefficient_per_nm: Annotated[
+        float,
+        Plausible(0.2, 8.0, "stiffens within the drive's torques, later than a play", of="per_rated_torque"),
+    ] = Field(0.02, gt=0)
     """Coefficient C, 1/(N m): the stiffness has doubled at the torque 1/C."""
 
     def contribute(self, build: Builder) -> None:

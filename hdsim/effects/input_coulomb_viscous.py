@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible
 from hdsim.effects._kernels import coulomb_viscous
 from hdsim.kernel import MOTOR_TORQUE
 from hdsim.number import FIXED
-from hdsim.parts import Builder, Effect, Signature
+from hdsim.parts import INPUT_FRICTION_HEAT, Builder, Effect, InputFriction, Signature
 
 
 class InputCoulombViscous(Effect):
@@ -40,19 +41,30 @@ class InputCoulombViscous(Effect):
         ),
     )
 
-    coulomb_nm: float = Field(0.032, ge=0)
+    coulomb_nm: Annotated[
+        float,
+        Plausible(
+            5e-3,
+            0.5,
+            "starting torque is 7 % of the rated one at size 20, ratio 100",
+            of="motor_rated_torque",
+        ),
+    ] = Field(0.032, ge=0)
     """Coulomb friction T_c at the motor shaft, N m."""
-    viscous_nm_s_per_rad: float = Field(3.5e-4, ge=0)
+    viscous_nm_s_per_rad: Annotated[
+        float,
+        Plausible(
+            5e-5, 5e-3, "no-load torque at 2000 and 3500 rpm: 7e-4 s at size 20", of="motor_rated_torque"
+        ),
+    ] = Field(3.5e-4, ge=0)
     """Viscous friction b at the motor shaft, N m s/rad."""
     smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Motor speed w_s over which the sign is smoothed, rad/s."""
 
     def contribute(self, build: Builder) -> None:
         """Add the friction torque to the motor."""
-        numbers = [
-            MOTOR_TORQUE,
-            self.coulomb_nm,
-            self.viscous_nm_s_per_rad,
-            self.smoothing_velocity_rad_per_s,
-        ]
-        build.element(coulomb_viscous, numbers)
+        friction = InputFriction(
+            self.coulomb_nm, self.viscous_nm_s_per_rad, self.smoothing_velocity_rad_per_s
+        )
+        build.element(coulomb_viscous, [MOTOR_TORQUE, *astuple(friction)], heat=INPUT_FRICTION_HEAT)
+        build.declare_input_friction(friction)

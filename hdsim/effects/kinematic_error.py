@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from hdsim.effects._fitting import Fitting, Harmonic, Periodic
+from hdsim.effects._fitting import Fitting, Harmonic, Periodic, Plausible
 from hdsim.effects._kernels import ARCMIN, harmonics
 from hdsim.parts import Builder, Effect, Parameters, Signature
 
@@ -19,7 +19,10 @@ class ErrorComponent(Parameters):
 
     order: float = Field(gt=0)
     """Periods per turn of ``per``."""
-    amplitude_arcmin: float | None = Field(None, ge=0)
+    amplitude_arcmin: Annotated[
+        float | None,
+        Plausible(3e-3, 3.0, "catalogue accuracy 0.5 to 1.5 arcmin peak to peak; coarse drives more"),
+    ] = Field(None, ge=0, le=60)
     """Amplitude (half of peak to peak) as an angle at the output, arcmin."""
     amplitude_rad: float | None = Field(None, ge=0)
     """The same in rad; give one of the two."""

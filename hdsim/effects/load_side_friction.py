@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible
 from hdsim.effects._kernels import coulomb_viscous
 from hdsim.kernel import OUTPUT_TORQUE
 from hdsim.number import FIXED
@@ -36,9 +36,13 @@ class LoadSideFriction(Effect):
         Fitting((Amplitude({"coulomb_nm": 1.0}), Amplitude({"viscous_nm_s_per_rad": 0.5}))),
     )
 
-    coulomb_nm: float = Field(1.0, ge=0)
+    coulomb_nm: Annotated[
+        float, Plausible(2e-3, 0.3, "estimate: cross-roller bearing with seal", of="rated_torque")
+    ] = Field(1.0, ge=0)
     """Coulomb friction T_c at the output, N m."""
-    viscous_nm_s_per_rad: float = Field(0.5, ge=0)
+    viscous_nm_s_per_rad: Annotated[
+        float, Plausible(5e-4, 0.3, "estimate: cross-roller bearing with seal", of="rated_torque")
+    ] = Field(0.5, ge=0)
     """Viscous friction b at the output, N m s/rad."""
     smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.005, gt=0)
     """Output speed w_s over which the sign is smoothed, rad/s."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
 
-from hdsim.effects._fitting import Amplitude, Fitting, Shape
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, STORED, element
-from hdsim.parts import Builder, Effect, Signature, State
+from hdsim.parts import INPUT_FRICTION_HEAT, Builder, Effect, InputFriction, Signature, State
 
 
 @element
@@ -90,17 +90,28 @@ class LugreFriction(Effect):
         ),
     )
 
-    stiffness_nm_per_rad: float = Field(10.0, gt=0)
+    stiffness_nm_per_rad: Annotated[
+        float,
+        Plausible(
+            2.0, 200.0, "presliding of 1e-3 to 1e-2 rad under the starting torque", of="motor_rated_torque"
+        ),
+    ] = Field(10.0, gt=0)
     """Bristle stiffness s_0 at the motor shaft, N m/rad."""
     damping_nm_s_per_rad: float = Field(0.003, ge=0)
     """Bristle damping s_1 at zero speed, N m s/rad."""
     viscous_nm_s_per_rad: float = Field(0.0, ge=0)
     """Viscous friction s_2 on top of the drive's own, N m s/rad."""
-    coulomb_nm: float = Field(0.032, gt=0)
+    coulomb_nm: Annotated[
+        float, Plausible(5e-3, 0.5, "as of input_coulomb_viscous", of="motor_rated_torque")
+    ] = Field(0.032, gt=0)
     """Coulomb friction T_c, N m."""
-    static_nm: float = Field(0.040, gt=0)
+    static_nm: Annotated[
+        float, Plausible(5e-3, 0.7, "1 to 1.5 times the Coulomb friction", of="motor_rated_torque")
+    ] = Field(0.040, gt=0)
     """Static friction T_s, N m."""
-    stribeck_velocity_rad_per_s: float = Field(5.0, gt=0)
+    stribeck_velocity_rad_per_s: Annotated[
+        float, Plausible(1.0, 10.0, "estimate in the literature of drives: 1 to 10 rad/s of the motor")
+    ] = Field(5.0, gt=0)
     """Stribeck speed v_s of the motor, rad/s."""
     damping_velocity_rad_per_s: float | None = Field(None, gt=0)
     """Speed v_d over which the bristle damping fades, rad/s (null: v_s, or less as passivity asks)."""
@@ -136,4 +147,6 @@ class LugreFriction(Effect):
         state = State(
             "bristle_deflection", "rad", 0.0, size, "mean deflection of the LuGre bristles, motor shaft"
         )
-        build.element(bristles, numbers, states=(state,))
+        build.element(bristles, numbers, states=(state,), heat=INPUT_FRICTION_HEAT)
+        # The bristles' torque depends on how far they are bent: nothing that another part could scale.
+        build.declare_input_friction(InputFriction(0.0, self.viscous_nm_s_per_rad, 1.0))

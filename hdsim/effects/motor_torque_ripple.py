@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Fitting, Periodic
+from hdsim.effects._fitting import Fitting, Periodic, Plausible
 from hdsim.kernel import (
     MOTOR_ANGLE,
     MOTOR_TORQUE,
@@ -48,7 +48,15 @@ class RippleComponent(Parameters):
 
     order: float = Field(gt=0)
     """Periods per motor turn: lcm(poles, slots) for cogging, 6 times the pole pairs for the windings."""
-    cogging_nm: float = Field(0.0, ge=0)
+    cogging_nm: Annotated[
+        float,
+        Plausible(
+            5e-4,
+            0.1,
+            "estimate: cogging of 0.1 to some percent of a servo motor's torque",
+            of="motor_rated_torque",
+        ),
+    ] = Field(0.0, ge=0)
     """Amplitude of the cogging torque, N m."""
     share: float = Field(0.0, ge=0, le=1)
     """Amplitude as a share of the torque that the drive transmits, reduced to the motor."""

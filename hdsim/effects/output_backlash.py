@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import WIDER, Amplitude, Fitting, Shape
+from hdsim.effects._fitting import WIDER, Amplitude, Fitting, Plausible, Shape
 from hdsim.effects._kernels import ARCMIN
 from hdsim.parts import Builder, Effect, Signature
 
@@ -59,9 +59,15 @@ class OutputBacklash(Effect):
         ),
     )
 
-    backlash_arcmin: float = Field(0.15, ge=0)
+    # Ten degrees: no gear.
+    backlash_arcmin: Annotated[
+        float, Plausible(0.02, 5.0, "Oldham play of 6 to 28 arcsec when new, times ten for wear")
+    ] = Field(0.15, ge=0, le=600)
     """Additional total play at the output, arcmin."""
-    coefficient_per_nm: float | None = Field(None, gt=0)
+    coefficient_per_nm: Annotated[
+        float | None,
+        Plausible(7.0, 500.0, "taken up earlier than any other compliance", of="per_rated_torque"),
+    ] = Field(None, gt=0)
     """Coefficient C, 1/(N m): three quarters of the play are taken up at the torque 1/C; else a sharp gap."""
 
     def contribute(self, build: Builder) -> None:

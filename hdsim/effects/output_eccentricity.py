@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Fitting, Harmonic
+from hdsim.effects._fitting import Fitting, Harmonic, Plausible
 from hdsim.effects._kernels import harmonics
 from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
@@ -17,7 +17,10 @@ class OutputEccentricity(Effect):
     """e = (d / r) sin(theta_l + phase): run-out d of the output's coupling circle of radius r."""
 
     title: ClassVar[str] = "output eccentricity"
-    source: ClassVar[str] = "first-order kinematics of an eccentric circle (angle d/r); 10 um is an estimate"
+    source: ClassVar[str] = (
+        "first-order kinematics of an eccentric circle (angle d/r); the default of 2 um, 0.55 arcmin peak to "
+        "peak, is an estimate: what the catalogue's accuracy of 1 arcmin leaves room for"
+    )
     signature: ClassVar[Signature] = Signature(
         lives_in=("output_angle",),
         channels=("output_angle",),
@@ -31,7 +34,10 @@ class OutputEccentricity(Effect):
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Harmonic("eccentricity_um", "phase_deg", 2.0),)),)
 
-    eccentricity_um: float = Field(2.0, ge=0)
+    # Two millimetres cannot be assembled.
+    eccentricity_um: Annotated[float, Plausible(0.5, 100.0, "run-out of a turned seat, a few to 100 um")] = (
+        Field(2.0, ge=0, le=2000)
+    )
     """Run-out (offset of the centres) d, um."""
     radius_mm: Annotated[float, FIXED] = Field(25.0, gt=0)
     """Radius r on which the torque passes to the output, mm."""

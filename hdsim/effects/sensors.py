@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Periodic
+from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Periodic, Plausible
 from hdsim.effects._kernels import ARCMIN
 from hdsim.parts import Builder, Effect, Parameters, Signature
 
@@ -20,11 +20,17 @@ class Encoder(Parameters):
 
     counts_per_turn: int | None = Field(None, ge=4)
     """Counts per turn of its shaft after interpolation (null: no quantisation)."""
-    eccentricity_arcmin: float = Field(0.0, ge=0)
+    # A tenth of the track's radius cannot be read.
+    eccentricity_arcmin: Annotated[
+        float, Plausible(0.01, 20.0, "disc offsets of 1 to 100 um at tracks of 15 to 50 mm")
+    ] = Field(0.0, ge=0, le=600)
     """Amplitude of the once-per-turn error, arcmin of its shaft: disc offset over track radius."""
     eccentricity_phase_deg: float = 0.0
     """Angle of the shaft at which that error crosses zero upward, degrees."""
-    delay_s: float = Field(0.0, ge=0)
+    # A second old is another record.
+    delay_s: Annotated[float, Plausible(2e-5, 1e-2, "a sample of a bus to ten of a slow one")] = Field(
+        0.0, ge=0, le=1
+    )
     """Age of a reading, s."""
     noise_arcsec: float = Field(0.0, ge=0)
     """Standard deviation of the noise before quantisation, arcsec."""
@@ -58,7 +64,9 @@ class SensorRipple(Parameters):
     """Periods per turn of ``per``."""
     per: Literal["wave_generator_turn", "output_turn"] = "wave_generator_turn"
     """The shaft whose turns ``order`` counts."""
-    amplitude_nm: float = Field(0.0, ge=0)
+    amplitude_nm: Annotated[
+        float, Plausible(2e-4, 0.05, "estimate: up to some percent of a sensor's range", of="rated_torque")
+    ] = Field(0.0, ge=0)
     """Constant part of the amplitude, N m."""
     relative_amplitude: float = Field(0.0, ge=0)
     """Part of the amplitude that is proportional to the torque."""

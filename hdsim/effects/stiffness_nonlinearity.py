@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible
 from hdsim.kernel import STORED, TWIST, TWIST_TORQUE, element
 from hdsim.parts import Builder, Effect, Signature
 
@@ -41,7 +41,9 @@ class StiffnessNonlinearity(Effect):
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((Amplitude({"cubic_nm_per_rad3": 3.0e8}),)),)
 
-    cubic_nm_per_rad3: float = Field(3.0e8, ge=0)
+    cubic_nm_per_rad3: Annotated[
+        float, Plausible(5e-3, 2.0, "K3 is 1.8 times K1 in catalogues", of="cubic_stiffness")
+    ] = Field(3.0e8, ge=0)
     """Cubic stiffness k_3 at the output, N m/rad^3."""
 
     def contribute(self, build: Builder) -> None:

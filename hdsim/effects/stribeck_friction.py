@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Amplitude, Fitting, Shape
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, element
 from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
@@ -55,9 +55,13 @@ class StribeckFriction(Effect):
         ),
     )
 
-    extra_static_nm: float = Field(0.008, ge=0)
+    extra_static_nm: Annotated[
+        float, Plausible(1e-3, 0.3, "T_s/T_c of 1 to 1.5, times the starting torque", of="motor_rated_torque")
+    ] = Field(0.008, ge=0)
     """Static minus Coulomb friction at the motor shaft, T_s - T_c, N m."""
-    stribeck_velocity_rad_per_s: float = Field(5.0, gt=0)
+    stribeck_velocity_rad_per_s: Annotated[
+        float, Plausible(1.0, 10.0, "estimate in the literature of drives: 1 to 10 rad/s of the motor")
+    ] = Field(5.0, gt=0)
     """Motor speed v_s over which the extra friction decays, rad/s."""
     smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Motor speed w_s over which the sign is smoothed, rad/s; well below v_s, or the bump is lost."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Fitting, Harmonic
+from hdsim.effects._fitting import Fitting, Harmonic, Plausible
 from hdsim.kernel import MOTOR_TORQUE, OUTPUT_TORQUE, STORED, element
 from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
@@ -56,11 +56,16 @@ class Unbalance(Effect):
         ),
     )
 
-    output_kg_m: float = Field(0.1, ge=0)
+    output_kg_m: Annotated[
+        float,
+        Plausible(2e-4, 0.1, "weights from a thousandth of the rated torque up to it", of="rated_torque"),
+    ] = Field(0.1, ge=0)
     """Static unbalance m r at the output, kg m."""
     output_phase_deg: Annotated[float, FIXED] = 0.0
     """Elevation of the output's centre of mass above the horizontal at zero output angle, degrees."""
-    motor_kg_m: float = Field(0.0, ge=0)
+    motor_kg_m: Annotated[
+        float, Plausible(1e-5, 2e-2, "weights up to a fifth of the rated torque", of="motor_rated_torque")
+    ] = Field(0.0, ge=0)
     """Static unbalance m r of the motor's rotor and wave generator, kg m."""
     motor_phase_deg: Annotated[float, FIXED] = 0.0
     """Elevation of the rotor's centre of mass above the horizontal at zero motor angle, degrees."""

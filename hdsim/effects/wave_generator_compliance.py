@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Fitting, Inverse, Shape
+from hdsim.effects._fitting import Fitting, Inverse, Plausible, Shape
 from hdsim.parts import Builder, Effect, Signature
 
 if TYPE_CHECKING:
@@ -44,9 +44,16 @@ class WaveGeneratorCompliance(Effect):
         ),
     )
 
-    stiffness_nm_per_rad: float = Field(8.0, gt=0)
+    stiffness_nm_per_rad: Annotated[
+        float, Plausible(1.0, 300.0, "estimate: in series with a drive of K1", of="motor_stiffness_k1")
+    ] = Field(8.0, gt=0)
     """Stiffness K_w at zero torque, at the wave generator, N m/rad (at the output: times ratio squared)."""
-    coefficient_per_nm: float = Field(2.0, gt=0)
+    coefficient_per_nm: Annotated[
+        float,
+        Plausible(
+            0.2, 8.0, "stiffens within the drive's torques, later than a play", of="per_motor_rated_torque"
+        ),
+    ] = Field(2.0, gt=0)
     """Coefficient C_w, per N m of wave-generator torque: the stiffness grows e-fold over 1/C_w."""
 
     def contribute(self, build: Builder) -> None:

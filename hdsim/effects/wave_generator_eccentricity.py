@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Fitting, Harmonic
+from hdsim.effects._fitting import Fitting, Harmonic, Plausible
 from hdsim.effects._kernels import harmonics
 from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
@@ -43,7 +43,15 @@ class WaveGeneratorEccentricity(Effect):
         Fitting((Harmonic("eccentricity_um", "phase_deg", 10.0),), turns=1.0),
     )
 
-    eccentricity_um: float = Field(10.0, ge=0)
+    # Five millimetres cannot be assembled.
+    eccentricity_um: Annotated[
+        float,
+        Plausible(
+            1.0,
+            300.0,
+            "run-out of shaft and bore: at the lobes' imbalance of 0.02 only their product is seen",
+        ),
+    ] = Field(10.0, ge=0, le=5000)
     """Offset d of the axes of wave generator and fixed spline, um."""
     lobe_imbalance: float = Field(0.02, ge=0, le=1)
     """Difference of the two lobes' shares of the load, beta (0: equal)."""

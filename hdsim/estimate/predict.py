@@ -4,7 +4,8 @@ The motion is prescribed, so an unstable or unknown controller does not matter a
 With both encoders the motor's motion is prescribed, output motion and torques are predicted. Without the
 motor's encoder the output's motion times the ratio stands for it, and torques are predicted. Where the
 reading of the output's torque sensor is the load, the sensor is compared with the slow part of its own
-reading: its ripple is faster than a load that is carried.
+reading: its ripple is faster than a load that is carried. A measured temperature is given to the parts that
+follow it, smoothed as the load.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.noise import noise_floor, quantisation_step, white_noise
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import signal, smoothed
+from hdsim.estimate.spline import SlowPart, signal, smoothed
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 LEAD_IN_S = 0.5
 #: Name of the torque that a model's output carries, where the sensor's reading is given.
 CARRIED = "carried_torque"
-#: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
-SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 #: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
 #: noise in a Jacobian looks like information; and the tolerance of a search, whose steps are larger.
 RTOL, COARSE_RTOL = 1e-6, 1e-5
@@ -102,7 +101,7 @@ def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked =
     Raises:
         InputError: nothing can be predicted; the message names what is missing.
     """
-    has = {c for c, good in record.trusted.items() if good.sum() > 20}
+    has = _readable(record)
     moving = {c for c in has if float(np.ptp(record.filled(c))) > 0}
     if load is None:
         load = "load_torque" if "load_torque" in moving else "scenario"
@@ -127,6 +126,11 @@ def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked =
             "motor_torque, output_torque or (with motor_angle) output_angle must be measured and vary"
         )
     return Plan(motion, load, tuple(predicted), locked)
+
+
+def _readable(record: Record) -> set[str]:
+    """Channels with more than a few readings that can be trusted."""
+    return {c for c, good in record.trusted.items() if good.sum() > 20}
 
 
 def _motor_locked(record: Record, moving: set[str]) -> Plan:
@@ -168,6 +172,11 @@ class Predictor:
             breaks, coefficients = smoothed(record.time, record.filled(plan.load))
             sign = -1.0 if plan.load == "output_torque" else 1.0
             self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
+        #: What a part may ask for beside the motion (``Builder.external``).
+        self.signals: dict[str, SignalData] = {}
+        if "temperature" in _readable(record):
+            found = smoothed(record.time, record.filled("temperature"))
+            self.signals["temperature"] = signal(*found, LEAD_IN_S)
         self._slow: SlowPart | None = None
         if plan.load == "output_torque":
             factor = ratio if plan.motion == "output_angle" else 1.0
@@ -274,6 +283,7 @@ class Predictor:
                 parts,
                 load_inertia_kg_m2=load.inertia_kg_m2,
                 motions=motions,
+                signals=self.signals,
                 seed=candidate.seed,
                 audited=False,
             )
@@ -299,30 +309,6 @@ class Predictor:
         return found
 
 
-class SlowPart:
-    """What of a channel is slower than a part of a wave-generator turn: a least-squares cubic spline.
-
-    Args:
-        time: shape (n,), s.
-        turns: shape (n,), angle of the wave generator, turns.
-    """
-
-    def __init__(self, time: Array, turns: Array) -> None:
-        n = len(time)
-        steps = np.abs(np.diff(turns)) / SLOW_KNOTS_TURNS + np.diff(time) / SLOW_KNOTS_S
-        # A knot every few samples at most: finer ones would follow the noise.
-        clock = np.concatenate([[0.0], np.cumsum(np.minimum(steps, 0.1))])
-        inner = np.interp(np.arange(1.0, np.floor(clock[-1])), clock, time)
-        self.time = time
-        self._knots = np.concatenate([[time[0]] * 4, inner[: n // 4], [time[-1]] * 4])
-
-    def of(self, values: Array) -> Array:
-        """The slow part of values of shape (n,)."""
-        from scipy.interpolate import make_lsq_spline
-
-        return np.asarray(make_lsq_spline(self.time, values, self._knots, k=3)(self.time))
-
-
 def unloaded_angle(record: Record, angle: Array) -> float:
     """Motor angle of a locked drive midway between its branches at zero torque, rad (0 without a torque).
 
@@ -331,7 +317,7 @@ def unloaded_angle(record: Record, angle: Array) -> float:
         angle: motor angle beside the output, shape (n,).
     """
     for channel in ("motor_torque", "output_torque"):
-        if channel in record.channels and record.trusted[channel].sum() > 20:
+        if channel in _readable(record):
             torque = record.filled(channel)
             small = np.abs(torque) < 0.05 * np.max(np.abs(torque))
             if small.any():

@@ -21,6 +21,8 @@ TAIL_S = 0.02
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
 #: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
 STEPS_ALLOW = 1.1
+#: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
+SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 
 
 def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array, Array]:
@@ -149,3 +151,27 @@ def signal(breaks: Array, coefficients: Array, lead_in_s: float = 0.0) -> Signal
     final = float(c[0] + width * (c[1] + width * (c[2] + width * c[3])))
     segment = Segment(law.CUBIC, times, rows)
     return SignalData(Move((segment, hold(end, final)), end, rows[0][0], final))
+
+
+class SlowPart:
+    """What of a channel is slower than a part of a wave-generator turn: a least-squares cubic spline.
+
+    Args:
+        time: shape (n,), s.
+        turns: shape (n,), angle of the wave generator, turns.
+    """
+
+    def __init__(self, time: Array, turns: Array) -> None:
+        n = len(time)
+        steps = np.abs(np.diff(turns)) / SLOW_KNOTS_TURNS + np.diff(time) / SLOW_KNOTS_S
+        # A knot every few samples at most: finer ones would follow the noise.
+        clock = np.concatenate([[0.0], np.cumsum(np.minimum(steps, 0.1))])
+        inner = np.interp(np.arange(1.0, np.floor(clock[-1])), clock, time)
+        self.time = time
+        self._knots = np.concatenate([[time[0]] * 4, inner[: n // 4], [time[-1]] * 4])
+
+    def of(self, values: Array) -> Array:
+        """The slow part of values of shape (n,)."""
+        from scipy.interpolate import make_lsq_spline
+
+        return np.asarray(make_lsq_spline(self.time, values, self._knots, k=3)(self.time))

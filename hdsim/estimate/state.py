@@ -48,22 +48,18 @@ class Added:
         effect's strength has no lower end: it is weak there.
         """
         if any(
-            shape.at_end(value, self.plausible)
+            shape.at_end(value, self.limits)
             for shape, value in zip(self.fitting.shapes, self.shapes, strict=True)
         ):
             return True
         return any(
-            term.at_end(self.coefficients[part], self.plausible)
+            term.at_end(self.coefficients[part], self.limits)
             for term, part in self.fitting.parts(self.orders)
         )
 
     def limits(self, path: str) -> tuple[float, float]:
         """Least and largest value that a field of the effect allows."""
         return number.limits(_metadata(self.effect, path))
-
-    def plausible(self, path: str) -> tuple[float, float]:
-        """Least and largest value of a field that its sources have."""
-        return number.plausible(_metadata(self.effect, path))
 
     def settings(self) -> dict[str, Any]:
         """Values of the effect's fields."""

@@ -193,6 +193,10 @@ class Observer:
         """Index of the first state that a part adds."""
         return self.model.system.size - self.model.system.quadratures - len(self.model.states)
 
+    def least_heat(self, rows: Array) -> tuple[Array, Array]:
+        """Heat (W) of the account of heat that has least, where that is negative (else 0), and its index."""
+        return rows[:, a.S_LEAST_HEAT], rows[:, a.S_LEAST_ACCOUNT]
+
     def state_table(self, times: Array, states: Array, inside: Array, rows: Array) -> Table:
         """The channels of an audited model at full rate."""
         model = self.model

@@ -93,6 +93,10 @@ def tell(run: Run, duration_s: float) -> None:
         f"simulated {duration_s:g} s in {work.steps} steps ({work.nfev} right-hand sides); energy audit: "
         f"residual {audit.residual:.2e} J of {audit.exchanged:.3g} J exchanged ({audit.relative:.1e})"
     )
+    if audit.gave_back:
+        click.echo(
+            f"error: energy from nothing: {audit.gave_back} gave back {audit.given_back:.2e} J", err=True
+        )
 
 
 class progress:  # noqa: N801 - used as a function

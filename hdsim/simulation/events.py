@@ -133,6 +133,7 @@ class EventDetector:
     _moving: bool | None = None
     _steps: int = 0
     _rejected: int = 0
+    _told_friction: bool = False
 
     def __post_init__(self) -> None:
         rated = self.model.rated_torque_nm
@@ -238,6 +239,19 @@ class EventDetector:
             teeth = tables["teeth"]
             found += self._force.feed(teeth.time, np.abs(teeth["normal_force"]).max(axis=1))
         return self._limited(sorted(found, key=lambda event: event.time))
+
+    def friction(self, time: float, part: str) -> list[Event]:
+        """The event of a friction or damping that gives energy back, once.
+
+        Args:
+            time: of the last sample, s.
+            part: its name; none: "".
+        """
+        if not part or self._told_friction:
+            return []
+        self._told_friction = True
+        text = f"energy from nothing: {part} gives back heat, which no friction can; do not trust this run"
+        return [Event(time, "error", "solver", text)]
 
     def finish(self, time: float, failure: str | None) -> list[Event]:
         """The last events: what was not told singly, and the end.

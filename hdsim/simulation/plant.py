@@ -214,6 +214,10 @@ class Plant:
         row[[0, 2, 4]] -= hessian[[2, 4, 5]]
         row[0] += bent * by_mo
         row[4] += bent * by_oo
+        housing = int(self.system.integers[a.HOUSING])
+        if housing:
+            # The mesh sees the angles from there.
+            row[6 + housing - OWN] += hessian[[2, 4, 5]].sum() - bent * (by_mo + by_oo)
         return np.asarray(row)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from hdsim.errors import HdsimError
 from hdsim.recording import Column, Event, Recording, Table
+from hdsim.simulation.audit import Audit
 from hdsim.simulation.channels import Observer
 from hdsim.simulation.events import EventDetector
 from hdsim.simulation.failures import speed_guard, told
@@ -47,40 +48,6 @@ class SampledLoop:
     controller: Any
     period_s: float
     place: int
-
-
-@dataclass
-class Audit:
-    """The energy balance of a run.
-
-    Attributes:
-        residual: largest |stored - start - supplied + delivered + heat|, J.
-        exchanged: energy that went through the drive, J: the largest of the variations of work supplied,
-            work delivered, heat, and of the stored energy.
-    """
-
-    residual: float = 0.0
-    _first: dict[str, float] = field(default_factory=dict)
-    _last: dict[str, float] = field(default_factory=dict)
-    _moved: dict[str, float] = field(default_factory=dict)
-
-    def add(self, table: Table) -> None:
-        """Account for a block of the state table."""
-        self.residual = max(self.residual, float(np.max(np.abs(table["energy_residual"]), initial=0.0)))
-        for name in ("work_supplied", "work_delivered", "heat", "potential_energy", "kinetic_energy"):
-            values = np.concatenate([[self._last.get(name, table[name][0])], table[name]])
-            self._moved[name] = self._moved.get(name, 0.0) + float(np.sum(np.abs(np.diff(values))))
-            self._last[name] = float(values[-1])
-
-    @property
-    def exchanged(self) -> float:
-        """Energy that went through the drive, J."""
-        return max(self._moved.values(), default=0.0)
-
-    @property
-    def relative(self) -> float:
-        """Residual over exchanged energy."""
-        return self.residual / self.exchanged if self.exchanged > 0 else 0.0
 
 
 class RunFailed(HdsimError):  # noqa: N818 - read aloud: "run failed"
@@ -259,7 +226,8 @@ class Run:
             rows = self.observer.samples(times, states, inside, held, self.loop.place)
             self.model.system.reals[self.loop.place] = now
         table = self.observer.state_table(times, states, inside, rows)
-        self.audit.add(table)
+        least, part = self.observer.least_heat(rows)
+        self.audit.add(table, least, part, self.model.heat_accounts)
         tables = {"state": table}
         if self.model.sensors:
             self._history = _extended(self._history, table, times[0] - self.observer.memory)
@@ -269,6 +237,7 @@ class Run:
             if chosen.any():
                 tables["teeth"] = self.observer.teeth_table(times[chosen], rows[chosen])
         self.events += self.detector.feed(tables, self.audit.exchanged, self.statistics)
+        self.events += self.detector.friction(float(times[-1]), self.audit.gave_back)
         return tables
 
     def _fail(self, found: Any) -> None:

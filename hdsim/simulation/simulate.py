@@ -179,6 +179,8 @@ def summary(run: Run, seconds: float) -> dict[str, str]:
         "energy_exchanged_j": f"{run.audit.exchanged:.3e}",
         "energy_residual_relative": f"{run.audit.relative:.3e}",
     }
+    if run.audit.gave_back:
+        found["energy_from_nothing"] = f"{run.audit.gave_back} gave back {run.audit.given_back:.3e} J"
     teeth = run.model.teeth
     if teeth is not None and teeth.table_error is not None:
         found["mesh_table_error"] = f"{teeth.table_error:.3e} of the rated torque"

@@ -14,12 +14,16 @@ from hdsim.kernel import (
     INPUT_FRICTION,
     MOTOR_TORQUE,
     MOTOR_VELOCITY,
+    OUTPUT_TORQUE,
+    OUTPUT_VELOCITY,
     OWN,
     STORED,
+    TWIST_RATE,
+    TWIST_TORQUE,
     Kernel,
     element,
 )
-from hdsim.parts import Effect, State
+from hdsim.parts import INPUT_FRICTION_HEAT, InputFriction, Part, State
 
 #: Rows of the outputs whose derivatives the contract asks for, own rates aside.
 SMOOTH_ROWS = [row for row in range(OWN) if row < STORED]
@@ -52,26 +56,53 @@ def _twists(addresses, offsets, numbers, motor_angle, output_angle, error):
 class FakeBuilder:
     """Implements ``hdsim.parts.Builder`` as a list."""
 
-    def __init__(self, ratio: float = -100.0, seed: int = 1, viscous: float = 3.5e-4) -> None:
+    def __init__(
+        self,
+        ratio: float = -100.0,
+        seed: int = 1,
+        viscous: float = 3.5e-4,
+        given: dict[str, int] | None = None,
+    ) -> None:
         self.ratio = ratio
         self.rated_torque_nm = 52.0
-        self.viscous_friction_nm_s_per_rad = viscous
+        self.declared: list[InputFriction] = [InputFriction(0.0, viscous, 1.0)]
+        self.input_frictions: Sequence[InputFriction] = ()
+        self.given = given or {}
         self.seed = seed
         self.first: list[tuple[Kernel, list[float], int]] = []
         self.last: list[tuple[Kernel, list[float], int]] = []
+        self.first_heat: list[str] = []
+        self.last_heat: list[str] = []
         self.twists: list[tuple[Kernel, list[float]]] = []
         self.states: list[State] = []
         self.compliances: list[Callable[[Any], Any]] = []
         self.half_gap = 0.0
+        self.moving_housing: tuple[int, float] | None = None
         self.sensors: dict[str, Any] = {}
 
     def element(
-        self, kernel: Kernel, parameters: Any, *, states: Sequence[State] = (), last: bool = False
+        self,
+        kernel: Kernel,
+        parameters: Any,
+        *,
+        states: Sequence[State] = (),
+        last: bool = False,
+        heat: str = "",
     ) -> int:
         own = OWN + len(self.states)
         self.states += states
         (self.last if last else self.first).append((kernel, [float(p) for p in parameters], own))
+        (self.last_heat if last else self.first_heat).append(heat or f"element {len(self.first)}")
         return own
+
+    def declare_input_friction(self, friction: InputFriction) -> None:
+        self.declared.append(friction)
+
+    def housing(self, own: int, inertia_kg_m2: float) -> None:
+        self.moving_housing = (own, inertia_kg_m2)
+
+    def external(self, name: str) -> int | None:
+        return self.given.get(name)
 
     def twist(self, kernel: Kernel, parameters: Any) -> None:
         self.twists.append((kernel, [float(p) for p in parameters]))
@@ -95,9 +126,14 @@ class FakeBuilder:
 class Model:
     """The kernels of some effects, callable."""
 
-    def __init__(self, *effects: Effect, base: float = 0.0, **options: Any) -> None:
+    def __init__(self, *effects: Part, base: float = 0.0, **options: Any) -> None:
+        # As in the assembly, friction of all parts is known after a first pass.
+        before = FakeBuilder(viscous=base, **options)
+        for effect in effects:
+            effect.contribute(before)
         self.builder = build = FakeBuilder(viscous=base, **options)
-        build.element(base_friction, [base])
+        build.input_frictions = before.declared
+        build.element(base_friction, [base], heat=INPUT_FRICTION_HEAT)
         for effect in effects:
             effect.contribute(build)
         self.columns = OWN + len(build.states)
@@ -127,6 +163,39 @@ class Model:
         flat = jacobian.reshape(-1)
         _elements(addresses, offsets, self._owns, numbers, self.columns, inputs, outputs, flat)
         return outputs, jacobian
+
+    def heats(self, inputs: np.ndarray) -> dict[str, float]:
+        """Heat of every account, W."""
+        found: dict[str, float] = {}
+        addresses, offsets, numbers = self._elements
+        for k, account in enumerate(self.builder.first_heat + self.builder.last_heat):
+            outputs, jacobian = np.zeros(self.columns), np.zeros(self.columns**2)
+            one = slice(k, k + 1)
+            _elements(
+                addresses[one],
+                offsets[one],
+                self._owns[one],
+                numbers,
+                self.columns,
+                inputs,
+                outputs,
+                jacobian,
+            )
+            found[account] = found.get(account, 0.0) + float(outputs[DISSIPATED])
+        return found
+
+    def powers(self, inputs: np.ndarray) -> float:
+        """Sum of the sizes of all powers and heats of the elements, W."""
+        total = 0.0
+        addresses, offsets, numbers = self._elements
+        for k in range(len(addresses)):
+            outputs, jacobian = np.zeros(self.columns), np.zeros(self.columns**2)
+            which = addresses[k : k + 1], offsets[k : k + 1], self._owns[k : k + 1]
+            _elements(*which, numbers, self.columns, inputs, outputs, jacobian)
+            speeds = [inputs[c] for c in (MOTOR_VELOCITY, OUTPUT_VELOCITY, TWIST_RATE)]
+            torques = [outputs[r] for r in (MOTOR_TORQUE, OUTPUT_TORQUE, TWIST_TORQUE)]
+            total += abs(outputs[DISSIPATED]) + sum(abs(t * w) for t, w in zip(torques, speeds, strict=True))
+        return total
 
     def error(self, motor_angle: float, output_angle: float) -> np.ndarray:
         """e, de/dm, de/do, d2e/dm2, d2e/dm do, d2e/do2."""

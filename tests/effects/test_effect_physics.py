@@ -326,6 +326,29 @@ def wind_up(effect: Effect, torque: float) -> float:
     return float(build.compliances[0](np.array([torque]))[0])
 
 
+@pytest.mark.parametrize("ratio", [-100.0, 51.0])
+def test_a_loss_by_direction_gives_the_two_efficiencies(ratio: float) -> None:
+    model = Model(LoadDependentLoss(coefficient=0.25, back_driving_coefficient=0.1), ratio=ratio)
+    for speed, load in ((150.0, 40.0), (-150.0, 40.0), (150.0, -40.0), (-150.0, -40.0)):
+        # At steady speed the motor carries the load's torque over the ratio and the friction.
+        motor = load / ratio - at(model, MOTOR_VELOCITY=speed, TRANSMITTED_TORQUE=load)[k.MOTOR_TORQUE]
+        into, out = motor * speed, load * speed / ratio
+        driving = out > 0
+        efficiency = out / into if driving else into / out
+        # 0.5 N m of 40 are rounded off.
+        assert efficiency == pytest.approx(1 / 1.25 if driving else 0.9, rel=5e-3)
+
+
+def test_a_loss_without_directions_is_the_same_in_both() -> None:
+    both = [
+        Model(LoadDependentLoss(coefficient=0.1)),
+        Model(LoadDependentLoss(coefficient=0.1, back_driving_coefficient=0.1)),
+    ]
+    for speed in (-0.3, 0.2, 90.0):
+        torques = [at(m, MOTOR_VELOCITY=speed, TRANSMITTED_TORQUE=-7.0)[k.MOTOR_TORQUE] for m in both]
+        assert torques[0] == torques[1]
+
+
 def test_a_gradual_play_is_taken_up_to_three_quarters_at_its_torque_and_never_beyond_its_width() -> None:
     effect = OutputBacklash(backlash_arcmin=3, coefficient_per_nm=0.5)
     assert wind_up(effect, 2.0) == pytest.approx(1.5 * ARCMIN * math.tanh(1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -15,8 +16,11 @@ from hypothesis import strategies as st
 import hdsim.kernel as k
 from hdsim.effects import catalogue
 from hdsim.effects.__main__ import page
+from hdsim.effects._fitting import range_of, scales_of
+from hdsim.effects.base_flexibility import BaseFlexibility
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
+from hdsim.effects.load_dependent_loss import LoadDependentLoss
 from hdsim.effects.lugre_friction import LugreFriction
 from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
 from hdsim.effects.thermal_friction import ThermalFriction
@@ -89,6 +93,8 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     "motor_torque_ripple, phases": (
         MotorTorqueRipple(components=(RippleComponent(order=7, cogging_nm=0.01, share=0.1, phase_deg=30),)),
     ),
+    "base_flexibility, housing": (BaseFlexibility(stiffness_nm_per_rad=3e5, natural_frequency_hz=70),),
+    "load_dependent_loss, by direction": (LoadDependentLoss(coefficient=0.2, back_driving_coefficient=0.05),),
     "unbalance, both": (Unbalance(motor_kg_m=1e-4, motor_phase_deg=20, output_phase_deg=-50),),
 }
 MODELS: dict[str, Model] = {}
@@ -239,6 +245,46 @@ def test_catalogue_entry_is_complete(name: str, kind: type) -> None:
     assert set(s.confused_with) <= set(catalogue()) - {name}
     properties = kind.model_json_schema()["properties"]
     assert all(field.get("description") for field in properties.values())
+
+
+FITTED = [
+    (name, path)
+    for name, kind in catalogue().items()
+    for path in dict.fromkeys(path for fitting in getattr(kind, "fittings", ()) for path in fitting.paths)
+]
+#: Angles at which something begins: periodic, so any number is one.
+PERIODIC = ("phase_deg", "position_deg")
+
+
+@pytest.mark.parametrize(("name", "path"), FITTED)
+def test_every_fitted_field_says_what_it_can_be(name: str, path: str) -> None:
+    found = range_of(catalogue()[name], path)
+    if path.endswith(PERIODIC):
+        return
+    assert math.isfinite(found.most) or found.plausible is not None
+    assert math.isfinite(found.least), "a size has a least value"
+    if found.plausible is not None:
+        assert 0 < found.plausible.low < found.plausible.high
+        assert found.plausible.source
+        if not found.plausible.of:
+            assert found.plausible.high <= found.most
+            assert found.least < found.plausible.high
+
+
+@pytest.mark.parametrize(("name", "path"), FITTED)
+def test_the_default_is_where_its_number_usually_is(name: str, path: str) -> None:
+    """With the drive of the defaults, size 20 at ratio 100."""
+    plausible = range_of(catalogue()[name], path).plausible
+    here: object = catalogue()[name]()
+    for key in path.split("."):
+        if isinstance(here, tuple):
+            here = here[int(key)] if int(key) < len(here) else None
+        else:
+            here = getattr(here, key, None)
+    if plausible is None or not isinstance(here, float) or here == 0:
+        return
+    low, high = plausible.times(scales_of(52.0, -100.0, 1.6e4))
+    assert low <= abs(here) <= high
 
 
 def test_own_states_have_unique_names() -> None:

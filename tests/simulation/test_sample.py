@@ -17,6 +17,7 @@ EFFECTS = {
     "none": {},
     "kinematic error": {"kinematic_error": {}},
     "ripple": {"motor_torque_ripple": {"components": [{"order": 12, "cogging_nm": 0.03}]}},
+    "housing": {"base_flexibility": {"stiffness_nm_per_rad": 1.5e5, "natural_frequency_hz": 60.0}},
     "memory": {"torsional_hysteresis_maxwell": {}, "lugre_friction": {}},
     "sensors": {
         "sensors": {
@@ -115,6 +116,10 @@ def test_a_model_without_an_audit_keeps_the_states_of_its_parts():
     audited, bare = (model_of(EFFECTS["memory"], audited=given) for given in (True, False))
     assert bare.system.size == audited.system.size - 3
     assert bare.system.quadratures == 0
+    # Nor does it keep accounts of heat.
+    assert audited.heat_accounts
+    assert bare.heat_accounts == ()
+    assert bare.system.scratch_size == audited.system.scratch_size - len(audited.heat_accounts)
     name = bare.states[0].name
     _, recorded = run_of(audited, 1e-8)
     found = sample(bare, recorded.time, (name,), rtol=1e-8)
