@@ -87,6 +87,7 @@ def screen(
     tried: list[Added] = []
     many: list[Added] = []
     ranges = bench.ranges(state)
+    measured = bench.measured
     for name, kind in catalogue().items():
         fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
         if name in present and name != "sensors":
@@ -96,6 +97,8 @@ def screen(
             continue  # it stands for what has no name
         for fitting in fittings:
             if any(channel not in bench.channels for channel in fitting.needs):
+                continue
+            if not measured.issuperset(fitting.follows) or measured.intersection(fitting.unless):
                 continue
             if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):
                 found.skipped[name] = f"the model has {' and '.join(fitting.covered_by)}"

@@ -124,6 +124,16 @@ class Bench:
         return tuple(dict.fromkeys(series.channel for series in self.series))
 
     @property
+    def measured(self) -> set[str]:
+        """Channels that every record has measured and that vary, compared or not."""
+        return set.intersection(
+            *(
+                {c for c, good in r.trusted.items() if good.sum() > 20 and np.ptp(r.channels[c][good]) > 0}
+                for r in (p.record for p in self.predictors)
+            )
+        )
+
+    @property
     def load_known(self) -> bool:
         """Whether the load is the measured torque at the output."""
         return all(predictor.plan.load == "output_torque" for predictor in self.predictors)
