@@ -194,7 +194,7 @@ def draw(number: int, seed: int) -> Case:
         "motion": ["recorded"] * len(learnt), "temperature": "temperature" in joint.records[0].channels,
         "formula": "catalogue", "hidden": effect.name, "joint": joint.name, "size": size, "unit": effect.unit,
         "at": {"order": effect.order, "field": effect.field, "size": size * effect.per_field}
-        if effect.order else None,
+        if effect.order else None, "own": list(joint.own),
     }  # fmt: skip
     plain = Case(
         f"{FAMILY}/plain/{joint.name.replace(' ', '-')}-{setup['held']}/{number}/{seed}", FAMILY, "null", (),

@@ -61,10 +61,11 @@ def outcome(line: Line) -> str:
 def _put_in(line: Line) -> str:
     """Outcome for a recording of a real machine into which something was put, against the one without it.
 
-    Of the names only those count that the recording as it is does not get.
+    Of the names only those count that the recording as it is does not get, and that its joint is not known
+    to deserve.
     """
     truth = set().union(*line["truth"])
-    before = {name for group in groups(line["without"]) for name in group}
+    before = {name for group in groups(line["without"]) for name in group} | set(line["setup"].get("own", []))
     at = line["setup"].get("at")
     new = [group for group in groups(line) if not set(group) & before]
     if truth and _named(line, truth, at) and not _named(line["without"], truth, at):

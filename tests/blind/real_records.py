@@ -38,6 +38,7 @@ class Joint:
         inertia: of the load, kg m^2; ``hanging`` the angle at which its arm hangs.
         load: where the load's torque comes from.
         records: recordings.
+        own: effects of the catalogue that SOURCE.md of the recordings says it has.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Joint:
     load: str | None
     records: tuple[Measured, ...]
     hanging: float = 0.0
+    own: tuple[str, ...] = ()
 
 
 def _table(name: str) -> np.ndarray:
@@ -110,7 +112,7 @@ def kinova(joint: int) -> Joint:
     )  # fmt: skip
     return Joint(
         f"kinova {joint}", ratio, "torque sensor", text, coulomb / ratio, 0.0, 0.0, "output_torque",
-        tuple(records),
+        tuple(records), own=("sensors", *(["motor_torque_ripple"] if joint > 5 else [])),
     )  # fmt: skip
 
 
@@ -143,7 +145,8 @@ def lara() -> Joint:
         damping=20.0, motor=2e-4, generator=5e-5, coulomb=coulomb, viscous=viscous, mesh="lumped",
         inertia=inertia, gravity=gravity,
     )  # fmt: skip
-    return Joint("lara 3", ratio, "both", text, coulomb, stiffness, inertia, None, (record,), hanging)
+    return Joint("lara 3", ratio, "both", text, coulomb, stiffness, inertia, None, (record,), hanging,
+                 ("kinematic_error",))  # fmt: skip
 
 
 def _arm(record: Measured, ratio: float, stiffness: float) -> tuple[float, float, float]:

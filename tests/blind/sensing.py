@@ -108,6 +108,8 @@ def numbers(setup: Setup, changes: dict[str, float]) -> Numbers:
         "arm": d.arm if setup.gravity and not setup.locked else 0.0,
         "sign_speed": LOCKED_SIGN_SPEED if setup.locked else SIGN_SPEED,
         "algebraic_sign": float(setup.algebraic_sign), "locked": float(setup.locked),
+        # Friction at top speed warms it by about three kelvins in ten seconds.
+        "heat_capacity": 3.0 * (d.coulomb + d.viscous * d.top_speed) * d.top_speed,
     }  # fmt: skip
     if setup.sensors == "known load":
         rng = np.random.default_rng([*setup.seed, 13])

@@ -69,7 +69,7 @@ def real(verdict, *names, before=(), order=2.0, size=10.0, truth="kinematic_erro
 
     at = {"order": order, "field": "amplitude_arcmin", "size": size}
     return line("effect" if truth else "null", [[truth]] if truth else [], "") | {
-        "setup": {"at": at},
+        "setup": {"at": at, "own": ["sensors"]},
         "verdict": said(verdict, names),
         "without": {"verdict": said("effect", before)},
     }
@@ -89,6 +89,8 @@ OWN = ("stribeck_friction", 0.0, 0.0)
         (real("effect", ("damaged_tooth", 0.0, 0.0), before=[OWN]), "wrong name"),
         (real("effect", OWN, before=[OWN]), "nothing"),
         (real("unknown", before=[OWN]), "unknown"),
+        # Known of the joint, and not named without what was put in.
+        (real("effect", ("sensors", 0.0, 0.0), truth=""), "right"),
         (real("effect", OWN, before=[OWN], truth=""), "right"),
         (real("effect", ("unbalance", 0.0, 0.0), before=[OWN], truth=""), "wrong name"),
     ],
