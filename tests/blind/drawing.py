@@ -11,7 +11,6 @@ from contract import Measured
 GRAVITY = 9.80665
 #: Rates of the log, Hz; the plants' clocks are multiples of all of them.
 RATES = (100, 125, 200, 250, 500, 1000, 2500, 5000)
-MOTIONS = ("multisine", "moves", "sweep", "plateaus", "creep")
 #: Channels of the sets of sensors.
 SENSORS = {
     "motor": ("motor_angle", "motor_torque"),
@@ -22,6 +21,8 @@ SENSORS = {
 COMPARED = ("motor_torque", "output_angle", "output_torque")
 #: Samples of all records of a case together, for the sake of the time that a diagnosis takes.
 MOST_SAMPLES = 90_000
+#: Frequency up to which a log's angle has to tell the acceleration, Hz: reversals of friction reach so far.
+TOLD_HZ = 90.0
 #: Start of a record that doesn't count for a strength, s.
 SKIP_S = 0.1
 
@@ -56,22 +57,23 @@ class Drive:
         k1, k2, k3 = self.stiffness
         return {
             "ratio": self.ratio, "motor_inertia": self.motor_inertia, "load_inertia": self.load_inertia,
-            "k1": k1, "k2": k2, "k3": k3, "t1": self.torques[0], "t2": self.torques[1], "damping": self.damping,
+            "k1": k1, "k2": k2, "k3": k3, "t1": self.torques[0], "t2": self.torques[1],
+            "damping": self.damping,
             "coulomb": self.coulomb, "viscous": self.viscous, "load_loss": self.load_loss, "arm": self.arm,
             "lever": self.lever, "rigid": float(self.rigid),
         }  # fmt: skip
 
 
-#: Paths in a scenario of the numbers that a base can have wrong, and the plant's names of each.
+#: Numbers that a base can have wrong: the field of ``Drive``, and the path in a scenario.
 PARAMETERS = {
-    "load inertia": (("load_inertia",), "load.inertia_kg_m2"),
-    "motor inertia": (("motor_inertia",), "drive.inertia.motor_kg_m2"),
-    "stiffness": (("k1", "k2", "k3"), "drive.torsion.stiffness_k1_nm_per_rad"),
-    "Coulomb friction": (("coulomb",), "drive.friction.coulomb_nm"),
-    "viscous friction": (("viscous",), "drive.friction.viscous_nm_s_per_rad"),
-    "load-dependent loss": (("load_loss",), "drive.friction.load_coefficient"),
-    "mass": (("arm",), "load.gravity.mass_kg"),
-    "torque constant": (("gain",), "motor_torque_gain"),
+    "load inertia": ("load_inertia", "load.inertia_kg_m2"),
+    "motor inertia": ("motor_inertia", "drive.inertia.motor_kg_m2"),
+    "stiffness": ("stiffness", "drive.torsion.stiffness_k1_nm_per_rad"),
+    "Coulomb friction": ("coulomb", "drive.friction.coulomb_nm"),
+    "viscous friction": ("viscous", "drive.friction.viscous_nm_s_per_rad"),
+    "load-dependent loss": ("load_loss", "drive.friction.load_coefficient"),
+    "mass": ("arm", "load.gravity.mass_kg"),
+    "torque constant": ("gain", "motor_torque_gain"),
 }
 #: Part of the motor's inertia that the base gives to the wave generator.
 GENERATOR_SHARE = 0.25
@@ -80,7 +82,7 @@ GENERATOR_SHARE = 0.25
 def draw_drive(rng: np.random.Generator, *, arm: bool, rigid: bool = False) -> Drive:
     """A drive of sizes 14 to 50 and ratios 50 to 160, both signs; numbers scale as the catalogues' do.
 
-    Stiffness and torques grow with the cube of the size, inertias with its fourth power, from size 20, ratio 100.
+    Stiffness and torques grow with the cube of the size, inertias with its fourth power.
     """
     size = int(rng.choice([14, 17, 20, 25, 32, 40, 45, 50]))
     scale, ratio = size / 20.0, int(rng.choice([50, 60, 80, 100, 120, 130, 160]))
@@ -99,6 +101,27 @@ def draw_drive(rng: np.random.Generator, *, arm: bool, rigid: bool = False) -> D
         0.03 * scale**2.3 * rng.uniform(0.6, 1.5), 3.5e-4 * scale**2.7 * rng.uniform(0.6, 1.5),
         rng.uniform(0.04, 0.1), weight, lever, rng.uniform(55.0, 110.0), rigid,
     )  # fmt: skip
+
+
+def off(
+    drive: Drive, names: Sequence[str], rng: np.random.Generator
+) -> tuple[Drive, float, dict[str, float]]:
+    """A drive whose named numbers are off by 5 to 25 %, the torque reading's factor, true values by path."""
+    gain, truth = 1.0, {}
+    for name in names:
+        factor = 1.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.25))
+        own, path = PARAMETERS[name]
+        if own == "gain":
+            gain = truth[path] = factor
+            continue
+        value = getattr(drive, own)
+        many = isinstance(value, tuple)
+        drive = replace(drive, **{own: tuple(v * factor for v in value) if many else value * factor})
+        number = factor * (value[0] if many else value)
+        if own == "motor_inertia":
+            number *= 1 - GENERATOR_SHARE
+        truth[path] = number / (GRAVITY * drive.lever) if own == "arm" else number
+    return drive, gain, truth
 
 
 def base_yaml(drive: Drive, *, mesh: str = "lumped", lacks: Sequence[str] = ()) -> str:
@@ -161,6 +184,11 @@ class Sensing:
         """Channels in which a model can be seen to be wrong."""
         return tuple(c for c in COMPARED if c in self.channels)
 
+    @property
+    def coarseness(self) -> float:
+        """Step of the encoders over their noise."""
+        return self.step["output_angle"] / self.noise["output_angle"]
+
     def sigma(self, channel: str) -> float:
         """Standard deviation of a channel's error, quantisation included."""
         return float(np.hypot(self.noise[channel], self.step[channel] / np.sqrt(12)))
@@ -179,30 +207,73 @@ class Sensing:
 
 
 def draw_sensing(
-    rng: np.random.Generator, drive: Drive, kinds: Sequence[str] = tuple(SENSORS), *, fast: bool = False
+    rng: np.random.Generator,
+    drive: Drive,
+    kinds: Sequence[str] = tuple(SENSORS),
+    *,
+    fast: bool = False,
+    quietest_rad: float = 1e-6,
 ) -> Sensing:
-    """Sensors for a drive: rates from 100 to 5000 Hz, steps of the encoders 0.05 to 10 times their noise."""
-    rate = int(rng.choice(RATES[4:] if fast else RATES, p=None if fast else (0.1, 0.08, 0.12, 0.14, 0.2, 0.2, 0.1, 0.06)))
+    """Sensors for a drive: rates from 100 to 5000 Hz, steps of the encoders 0.05 to 10 times their noise.
+
+    Args:
+        rng: random numbers.
+        drive: the drive, to which noise is scaled.
+        kinds: of ``SENSORS``, among which is chosen.
+        fast: 500 Hz at least.
+        quietest_rad: least noise of the output's encoder.
+    """
+    often = np.array((0.1, 0.08, 0.12, 0.14, 0.23, 0.24, 0.06, 0.03)) * [
+        rate >= 500 or not fast for rate in RATES
+    ]
+    rate = int(rng.choice(RATES, p=often / often.sum()))
     noise = {
         "motor_angle": log_uniform(rng, 5e-6, 6e-5),
-        "output_angle": log_uniform(rng, 1e-6, 1.2e-5),
-        "motor_torque": drive.coulomb * log_uniform(rng, 0.06, 0.3),
+        "output_angle": log_uniform(rng, quietest_rad, 1.2e-5),
+        # In a slow log of a reversal nobody can tell the friction's jump to less.
+        "motor_torque": drive.coulomb * log_uniform(rng, max(0.06, 14.0 / rate), 0.3),
         "output_torque": drive.torques[0] * log_uniform(rng, 0.006, 0.03),
         "temperature": 0.05,
     }
     noise["load_torque"] = drive.torques[0] * log_uniform(rng, 0.003, 0.015)
     coarse = log_uniform(rng, 0.05, 10.0)
+    # What the encoder leaves unknown of the inertia's torque up to TOLD_HZ is well below the noise.
+    inertia = drive.motor_inertia + drive.load_inertia / drive.ratio**2
+    bend = inertia * (2 * np.pi * TOLD_HZ) ** 2 * np.sqrt(min(2 * TOLD_HZ / rate, 1.0) / 5.0)
+    known = min(
+        noise["motor_torque"], noise["output_torque"] * abs(drive.ratio) * inertia / drive.load_inertia
+    )
+    finest = 0.15 * known / bend / np.hypot(1.0, coarse / np.sqrt(12))
+    # And of the output's angle: its steps are no white noise in a slow motion, smoothing leaves them.
+    noise["motor_angle"] = min(noise["motor_angle"], finest, 0.3 * abs(drive.ratio) * noise["output_angle"])
+    # The load's noise winds the spring up: by less than a quarter of the output encoder's errors.
+    finest = 0.25 * drive.stiffness[0] * noise["output_angle"] * np.hypot(1.0, coarse / np.sqrt(12))
+    noise["load_torque"] = min(noise["load_torque"], finest)
     step = {c: 0.3 * value for c, value in noise.items()}
     step |= {"motor_angle": coarse * noise["motor_angle"], "output_angle": coarse * noise["output_angle"]}
     return Sensing(str(rng.choice(list(kinds))), rate, noise, step, bool(rng.random() < 0.35))
 
 
 def slower(drive: Drive, rate: int) -> Drive:
-    """The drive with a top speed whose fourth order has four samples a period at least in a log of that rate."""
+    """The drive with a top speed whose fourth order has four samples a period in a log of that rate."""
     return replace(drive, top_speed=min(drive.top_speed, 2 * np.pi * rate / 16.0))
 
 
-def draw_lengths(rng: np.random.Generator, rate: int, *, least: float = 5.0) -> tuple[list[float], list[float], str]:
+def started(d: Drive, sensing: Sensing) -> float:
+    """Share of a start with the arm raised that a tool can know.
+
+    Nobody knows how a drive was wound up before its log begins. hdsim lets its model ring for 0.5 s from no
+    load at all; what is left of that then has to stay below a fifth of the output angle's noise.
+    """
+    if d.arm == 0.0 or d.rigid:
+        return 1.0
+    left = d.arm * np.sin(0.8) / d.stiffness[0] * np.exp(-0.25 * d.damping / d.load_inertia)
+    return float(min(1.0, 0.2 * sensing.noise["output_angle"] / left))
+
+
+def draw_lengths(
+    rng: np.random.Generator, rate: int, *, least: float = 5.0
+) -> tuple[list[float], list[float], str]:
     """Lengths of the records and of those held out, s, and how data are held out."""
     most = MOST_SAMPLES / rate
 
@@ -219,60 +290,8 @@ def draw_lengths(rng: np.random.Generator, rate: int, *, least: float = 5.0) -> 
     return given, held, "files" if files else "stretches"
 
 
-def motion(
-    kind: str, seconds: float, top: float, rng: np.random.Generator, *, tick_hz: int, smooth_s: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Angle and speed of the output at a controller's ticks, shape (n,) each; it starts at rest at angle 0.
-
-    Args:
-        kind: of ``MOTIONS``.
-        seconds: length.
-        top: speed that is not exceeded, rad/s at the output.
-        rng: random numbers.
-        tick_hz: rate of the ticks.
-        smooth_s: three moving means of this width take the corners off.
-    """
-    t = np.arange(round(seconds * tick_hz)) / tick_hz
-    pace = 0.1 / smooth_s  # slower where the smoothing is wide
-    if kind == "multisine":
-        lines = zip(np.exp(rng.uniform(np.log(0.06), np.log(1.0 * pace), 4)), rng.uniform(0, 2 * np.pi, 4),
-                    rng.uniform(0.3, 1.0, 4), strict=True)  # fmt: skip
-        speed = sum(size * np.sin(2 * np.pi * f * t + phase) for f, phase, size in lines)
-    elif kind == "moves":
-        speed, now, place = np.zeros_like(t), 0.1, 0.0
-        while now < t[-1]:
-            lasts, way = rng.uniform(0.5, 2.0) / pace, rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0)
-            way = -np.sign(place) * abs(way) if abs(place) > 1.2 else way
-            s = np.clip((t - now) / lasts, 0.0, 1.0)
-            speed += way * 16 * (s * (1 - s)) ** 2  # the speed of a fifth-degree polynomial from rest to rest
-            place += way * lasts * 0.53
-            now += lasts + rng.uniform(0.0, 0.4)
-    elif kind == "sweep":
-        low, high = rng.uniform(0.1, 0.2), rng.uniform(1.2, 3.0) * pace
-        share = np.abs(2 * t / max(t[-1], 1e-9) - 1)
-        frequency = high * (low / high) ** share
-        speed = (frequency / low) ** -0.4 * np.sin(2 * np.pi * np.cumsum(frequency) / tick_hz)
-    elif kind == "plateaus":
-        levels = np.repeat(rng.permutation([0.05, 0.2, 0.5, 0.75, 1.0]), 2) * np.tile([1.0, -1.0], 5)
-        speed = levels[np.minimum((t * 10 / max(seconds, 1e-9)).astype(int), 9)]
-    else:
-        turns = np.sin(2 * np.pi * t / rng.uniform(2.0, 5.0) + rng.uniform(0, 6.3))
-        speed = rng.uniform(0.06, 0.25) * np.sign(turns) * rng.uniform(0.7, 1.0)
-    peak = float(np.max(np.abs(speed)))
-    if kind not in ("plateaus", "creep"):
-        speed = speed / max(peak, 1e-9) * rng.uniform(0.6, 1.0)
-    speed = top * speed * np.clip(t / max(3 * smooth_s, 0.2), 0.0, 1.0)
-    for _ in range(3):
-        width = max(round(smooth_s * tick_hz), 1)
-        padded = np.concatenate([np.zeros(width), speed, np.full(width, speed[-1])])
-        speed = np.convolve(padded, np.ones(width) / width, mode="same")[width:-width]
-    speed[0] = 0.0
-    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / tick_hz
-    return angle, speed
-
-
 def visible(trace: np.ndarray, columns: Sequence[np.ndarray]) -> tuple[float, float]:
-    """Root-mean-square of a trace in the channel where it is largest: as it is, and beyond what columns explain.
+    """Root-mean-square of a trace where it is largest: as it is, and beyond what columns explain.
 
     Args:
         trace: shape (channels, n), over the noise.

@@ -1,29 +1,42 @@
-"""Blind plants in MuJoCo: ``draw(number, seed)`` hides an effect in a drive of ``mujoco_plant`` and measures it.
+"""Blind plants in MuJoCo: ``draw(number, seed)`` hides an effect in a drive and measures it.
 
-Strength: the trace of what is hidden along one motor motion, that of the plant without it under its controller. With
-and without the effect the output (and the torque that the motion takes) is simulated again with the motor's motion
-prescribed; the difference over the noise, after least squares on offsets and on the plant's sensitivities to the
-base's own numbers, is what counts. Of several records the first counts, 12 s of it at most.
+Strength: the trace of what is hidden along one motor motion, that of the plant without it under its controller.
+With and without the effect the output (and the torque that the motion takes) is simulated again with the motor's
+motion prescribed; the difference over the noise, after least squares on offsets and on the plant's sensitivities
+to the base's own numbers, is what counts. Of several records the first counts, 12 s of it at most. What is only a
+number of the base counts as it is.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from contract import Case, Kind, Measured
 from drawing import (
-    MOTIONS, PARAMETERS, SENSORS, SKIP_S, Drive, Sensing, base_yaml, draw_drive, draw_lengths, draw_sensing,
-    log_uniform, motion, slower, visible,
-)  # fmt: skip
+    PARAMETERS,
+    SENSORS,
+    SKIP_S,
+    Drive,
+    Sensing,
+    base_yaml,
+    draw_drive,
+    draw_lengths,
+    draw_sensing,
+    log_uniform,
+    off,
+    slower,
+    started,
+    visible,
+)
+from moving import MOTIONS, motion
 from mujoco_effects import EFFECTS, OUTSIDE, PAIRS, Changes, Hidden
 from mujoco_plant import STEP_HZ, Motion, Numbers, acceleration, simulate
 
 FAMILY = "mujoco"
 KINDS: tuple[Kind, ...] = ("null", "effect", "effect", "parameter", "effect", "pair", "effect", "outside")
-#: Time for which the drive stands before its log begins, s; longest part of a record that a strength is taken over.
+#: Time for which the drive stands before its log begins, and most of a record that a strength is taken of, s.
 STANDING_S, STRENGTH_S = 0.5, 12.0
 STRENGTHS = (0.5, 100.0)
 TRIES, STEPS, TOLERANCE = 3, 6, 0.1
@@ -40,7 +53,9 @@ class Experiment:
     motions: tuple[Motion, ...]
     held: tuple[Motion, ...]
     kinds: tuple[str, ...]
-    own: Changes = field(default_factory=dict)  # what the plant has without the effect and differs from the base
+    own: Changes = field(
+        default_factory=dict
+    )  # what the plant has without the effect and differs from the base
 
     @property
     def rows_hz(self) -> float:
@@ -48,21 +63,26 @@ class Experiment:
         return STEP_HZ / self.motions[0].rows_every
 
 
-def told(kind: str, seconds: float, e: Drive, sensing: Sensing, tick_steps: int, rng: np.random.Generator) -> Motion:
+def told(
+    kind: str, seconds: float, e: Drive, sensing: Sensing, tick_steps: int, rng: np.random.Generator
+) -> Motion:
     """A motion with its load, the time before the log included."""
     tick_hz = STEP_HZ // tick_steps
     rate = sensing.rate
     angle, speed = motion(
-        kind, seconds, e.top_speed / abs(e.ratio), rng, tick_hz=tick_hz, smooth_s=max(0.06, 8.0 / rate)
+        kind, seconds, e.top_speed / abs(e.ratio), rng, tick_hz=tick_hz, smooth_s=max(0.06, 20.0 / rate)
     )
     standing = round(STANDING_S * tick_hz)
-    start = rng.uniform(-0.8, 0.8)
+    start = rng.uniform(-0.8, 0.8) * started(e, sensing)
     reference = np.column_stack([start + np.pad(angle, (standing, 0)), np.pad(speed, (standing, 0))])
     steps = len(reference) * tick_steps
     load = np.zeros(steps)
     if sensing.kind == "known load":
         t = np.arange(steps) / STEP_HZ - STANDING_S
-        lines = [(np.exp(rng.uniform(np.log(0.08), np.log(min(1.5, rate / 80)))), rng.uniform(0, 6.3)) for _ in range(3)]
+        lines = [
+            (np.exp(rng.uniform(np.log(0.08), np.log(min(1.5, rate / 80)))), rng.uniform(0, 6.3))
+            for _ in range(3)
+        ]
         load = sum(np.sin(2 * np.pi * f * t + phase) for f, phase in lines)
         load = load * np.clip(t / 0.5, 0.0, 1.0) ** 2 * (3 - 2 * np.clip(t / 0.5, 0.0, 1.0))
         load *= e.torques[1] * rng.uniform(0.3, 0.8) / np.max(np.abs(load))
@@ -84,7 +104,7 @@ def readings(log: np.ndarray, x: Experiment, errors: Changes) -> dict[str, np.nd
 
 
 def numbers_of(x: Experiment, changes: Changes) -> Numbers:
-    """The plant of an experiment with changes of its nominal numbers; sensor errors among them are left out."""
+    """The plant of an experiment with changes of its nominal numbers; sensors' errors are left out."""
     given = x.drive.base | x.own | changes
     return Numbers(**{name: float(value) for name, value in given.items() if name in Numbers._fields})
 
@@ -97,7 +117,8 @@ class Visibility:
         first = x.motions[0]
         ticks = round((STANDING_S + STRENGTH_S) * STEP_HZ / first.ticks_every)
         self.motion = first._replace(
-            reference=first.reference[:ticks], load=first.load[: len(first.reference[:ticks]) * first.ticks_every]
+            reference=first.reference[:ticks],
+            load=first.load[: len(first.reference[:ticks]) * first.ticks_every],
         )
         self.base = numbers_of(x, {})
         self.like = simulate(self.base, self.motion)
@@ -122,13 +143,18 @@ class Visibility:
             if value := getattr(p, name):
                 columns.append(self._weighed({name: value * (1 + CHANGE)}) - self.plain)
         if not p.rigid:
-            columns.append(self._weighed({k: getattr(p, k) * (1 + CHANGE) for k in ("k1", "k2", "k3")}) - self.plain)
+            columns.append(
+                self._weighed({k: getattr(p, k) * (1 + CHANGE) for k in ("k1", "k2", "k3")}) - self.plain
+            )
         # What only the motor's torque shows is known without another simulation.
         speed, joint = like[:, 1], like[:, 4]
         sign = np.tanh(speed / 0.5)
         accelerated = acceleration(like, 1.0 / x.rows_hz)
         for torque in (accelerated, sign, speed, np.abs(joint) * sign, like[:, 5], joint, np.sin(like[:, 2])):
-            rows = [self._cut(torque) if c == "motor_torque" else 0.0 * self._cut(torque) for c in x.sensing.compared]
+            rows = [
+                self._cut(torque) if c == "motor_torque" else 0.0 * self._cut(torque)
+                for c in x.sensing.compared
+            ]
             columns.append(np.array(rows))
         if p.rigid:
             joints = (accelerated, np.sin(like[:, 2])) if p.arm else (accelerated,)
@@ -141,8 +167,8 @@ class Visibility:
         """Plain strength, and beyond what the base's own numbers explain."""
         return visible(self._weighed(changes) - self.plain, self.columns)
 
-    def sized(self, hidden: Hidden, uniform: np.ndarray, same: bool, wanted: float) -> tuple[Changes, float]:
-        """Changes with the wanted strength, by a secant iteration over logarithms; the nearest that is physical."""
+    def sized(self, hidden: Hidden, uniform: list[float], same: bool, wanted: float) -> tuple[Changes, float]:
+        """Changes with the wanted strength, by a secant iteration; the nearest that is physical."""
         size, tried = min(1.0, hidden.most), []
         best: tuple[float, Changes, float] | None = None
         for _ in range(STEPS):
@@ -160,7 +186,9 @@ class Visibility:
                 break
             slope = 1.0
             if len(tried) > 1 and abs(tried[-1][0] - tried[-2][0]) > 1e-6:
-                slope = float(np.clip((tried[-1][1] - tried[-2][1]) / (tried[-1][0] - tried[-2][0]), 0.4, 3.0))
+                slope = float(
+                    np.clip((tried[-1][1] - tried[-2][1]) / (tried[-1][0] - tried[-2][0]), 0.4, 3.0)
+                )
             way = float(np.clip((np.log(wanted) - tried[-1][1]) / slope, -6.0, 6.0))
             size = min(size * float(np.exp(way)), hidden.most)
         if best is None:
@@ -168,7 +196,9 @@ class Visibility:
         return best[1], best[2]
 
 
-def draw_experiment(rng: np.random.Generator, hidden: tuple[Hidden, ...], parameters: tuple[str, ...]) -> Experiment:
+def draw_experiment(
+    rng: np.random.Generator, hidden: tuple[Hidden, ...], parameters: tuple[str, ...]
+) -> Experiment:
     """Drive, sensors, motions: such that what is hidden can be seen there at all."""
     kinds = [k for k in SENSORS if all(set(h.channels) <= set(SENSORS[k]) for h in hidden)]
     weighed = any(h.loaded for h in hidden)
@@ -185,8 +215,11 @@ def draw_experiment(rng: np.random.Generator, hidden: tuple[Hidden, ...], parame
     drive = slower(drive, sensing.rate)
     tick = int(rng.choice([5, 2]))
     least = max([5.0, *(h.seconds for h in hidden)])
-    given, held, how = draw_lengths(rng, sensing.rate, least=least)
+    given, held, _ = draw_lengths(rng, sensing.rate, least=least)
     allowed = [k for k in MOTIONS if all(k in h.motions for h in hidden)]
+    if sensing.rate < 200:
+        # A fast reversal lies between two samples, and what it excites with it.
+        allowed = [k for k in allowed if k != "plateaus"]
     chosen = [str(k) for k in rng.choice(allowed, len(given))]
     others = [k for k in allowed if k not in chosen] or allowed
     later = [str(k) for k in rng.choice(others, len(held))]
@@ -200,7 +233,9 @@ def draw_experiment(rng: np.random.Generator, hidden: tuple[Hidden, ...], parame
     )
 
 
-def measured(x: Experiment, changes: Changes, rng: np.random.Generator) -> tuple[list[Measured], list[Measured]]:
+def measured(
+    x: Experiment, changes: Changes, rng: np.random.Generator
+) -> tuple[list[Measured], list[Measured]]:
     """The records of a plant, and those that are held out."""
     found: tuple[list[Measured], list[Measured]] = ([], [])
     p = numbers_of(x, changes)
@@ -211,24 +246,6 @@ def measured(x: Experiment, changes: Changes, rng: np.random.Generator) -> tuple
             cut = {c: v[round(STANDING_S * x.rows_hz) :: every] for c, v in read.items()}
             found[group].append(x.sensing.measure(f"{('run', 'held')[group]} {k + 1}", cut, rng))
     return found
-
-
-def off(x: Experiment, names: tuple[str, ...], rng: np.random.Generator) -> tuple[Changes, dict[str, float]]:
-    """Numbers of the base that are off by 5 to 25 %, and their true values by path."""
-    nominal = x.drive.base | {"gain": 1.0}
-    changes: Changes = {}
-    truth = {}
-    for name in names:
-        factor = 1.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.25))
-        own, path = PARAMETERS[name]
-        changes |= {key: nominal[key] * factor for key in own}
-        value = changes[own[0]]
-        if name == "motor inertia":
-            value *= 0.75
-        if name == "mass":
-            value /= 9.80665 * x.drive.lever
-        truth[path] = value
-    return changes, truth
 
 
 def draw(number: int, seed: int) -> Case:
@@ -270,23 +287,25 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
         seen = Visibility(x)
     for h in hidden:
         wanted = log_uniform(rng, *(STRENGTHS if kind != "pair" else (1.0, 50.0)))
-        own, reached = seen.sized(h, rng.random(6), same, wanted)
+        own, reached = seen.sized(h, rng.random(6).tolist(), same, wanted)
         changes |= own
         strengths.append(round(reached, 3))
         near = min(near, reached / wanted)
         if same and h.numbers is not None:
             truth |= h.numbers(x.drive, own)
     if names:
-        changes, truth = off(x, names, rng)
-        strengths = [round(seen.of({k: v})[0], 3) for k, v in changes.items() if k not in ("k2", "k3")]
+        wrong, gain, truth = off(x.drive, names, rng)
+        changes = {k: v for k, v in wrong.base.items() if v != x.drive.base[k]}
+        changes |= {"gain": gain} if gain != 1.0 else {}
+        strengths = [round(seen.of(changes)[0], 3)]
     records, held = measured(x, changes, rng)
     what = "+".join(h.name for h in hidden) or "+".join(names) or "nothing"
     sensing = x.sensing
     setup = {
-        "rate_hz": sensing.rate, "encoder_step_over_noise": sensing.step["output_angle"] / sensing.noise["output_angle"],
+        "rate_hz": sensing.rate, "encoder_step_over_noise": sensing.coarseness,
         "sensors": sensing.kind, "seconds": [float(r.time[-1]) for r in records], "records": len(records),
         "held": "files" if held else "stretches", "motion": x.kinds, "temperature": sensing.temperature,
-        "formula": "catalogue" if same and hidden and kind != "outside" else "other" if hidden else "catalogue",
+        "formula": "other" if hidden and (kind == "outside" or not same) else "catalogue",
         "mesh": "rigid" if x.drive.rigid else "lumped", "load": "arm" if x.drive.arm else "inertia",
         "size": x.drive.size, "ratio": x.drive.ratio, "changes": changes,
         "noise": {c: sensing.sigma(c) for c in sensing.channels},

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from drawing import GRAVITY, MOTIONS, Drive
+from drawing import GRAVITY, Drive
+from moving import MOTIONS
 
 Changes = dict[str, float]
-Builder = Callable[[Drive, np.ndarray, float, bool], Changes]
+Builder = Callable[[Drive, Sequence[float], float, bool], Changes]
 
 ARCMIN = math.pi / 10800
 TURN = 2 * math.pi
@@ -57,7 +57,7 @@ def _twist(d: Drive) -> float:
     return d.torques[0] / d.stiffness[0]
 
 
-def kinematic(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def kinematic(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     a = 3e-5 * x
     found = {"ke_2": a, "ke_2_phase": TURN * r[0], "ke_rel": (0.3 + 0.6 * r[1]) * a, "ke_rel_phase": TURN * r[2],
              "ke_4": 0.3 * a, "ke_4_phase": TURN * r[3]}  # fmt: skip
@@ -65,10 +65,13 @@ def kinematic(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
 
 
 def kinematic_numbers(d: Drive, c: Changes) -> dict[str, float]:
-    return {f"components.{k}.amplitude_arcmin": c[name] / ARCMIN for k, name in enumerate(("ke_2", "ke_rel", "ke_4"))}
+    return {
+        f"components.{k}.amplitude_arcmin": c[name] / ARCMIN
+        for k, name in enumerate(("ke_2", "ke_rel", "ke_4"))
+    }
 
 
-def dent(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def dent(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     return {"dent": -5e-5 * x, "dent_at": math.pi * r[0], "dent_width": 0.12 + 0.15 * r[1]}
 
 
@@ -76,11 +79,15 @@ def dent_numbers(d: Drive, c: Changes) -> dict[str, float]:
     return {"amplitude_arcmin": c["dent"] / ARCMIN, "width_deg": math.degrees(c["dent_width"])}
 
 
-def stribeck(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
-    return {"stribeck": 0.3 * d.coulomb * x, "stribeck_speed": 3.0 + 6.0 * r[0], "stribeck_power": 2.0 if same else 1.0}
+def stribeck(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
+    return {
+        "stribeck": 0.3 * d.coulomb * x,
+        "stribeck_speed": 3.0 + 6.0 * r[0],
+        "stribeck_power": 2.0 if same else 1.0,
+    }
 
 
-def bristles(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def bristles(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     found = {"bristle": d.coulomb / (3e-3 + 5e-3 * r[0]), "bristle_speed": 3.0 + 5.0 * r[1],
              "bristle_damping": 0.02 * d.coulomb}  # fmt: skip
     if same:
@@ -90,43 +97,47 @@ def bristles(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
     return found | {"coulomb": 0.0, "bristle_coulomb": d.coulomb, "bristle_static": d.coulomb * (1 + 0.3 * x)}
 
 
-def friction(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def friction(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     power = 1.0 if same else 0.7 + 0.2 * r[0]
-    return {"extra_coulomb": d.coulomb * x, "extra_viscous": d.viscous * d.top_speed ** (1 - power) * x, "extra_power": power}
+    return {
+        "extra_coulomb": d.coulomb * x,
+        "extra_viscous": d.viscous * d.top_speed ** (1 - power) * x,
+        "extra_power": power,
+    }
 
 
-def loss(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def loss(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     return {"driving_loss": 0.05 * x, "backdriving_loss": (1.0 if same else 0.3 + 0.4 * r[0]) * 0.05 * x}
 
 
-def thermal(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def thermal(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     power = (d.coulomb + 0.4 * d.viscous * d.top_speed) * 0.4 * d.top_speed
     return {"thermal": 0.02 * x, "thermal_offset": 0.0 if same else 95.0,
             "heat_capacity": (0.4 + 0.5 * r[0]) * power}  # fmt: skip
 
 
 def hysteresis(spread: float) -> Builder:
-    def build(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+    def build(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
         twist = (0.15 + 0.35 * r[0] if same else 0.5 + 0.5 * r[0]) * _twist(d)
         return {"slip": 0.1 * d.torques[0] * x, "slip_twist": twist, "slip_spread": spread}
 
     return build
 
 
-def ripple(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def ripple(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     order = (6.0, 8.0, 12.0)[int(2.999 * r[0])]
     found = {"cogging": 0.15 * d.coulomb * x, "cogging_order": order, "cogging_phase": TURN * r[1]}
     return found if same else found | {"cogging_2": 0.06 * d.coulomb * x, "cogging_2_order": 2 * order,
                                        "cogging_2_phase": TURN * r[2]}  # fmt: skip
 
 
-def output_friction(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def output_friction(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     size = 0.1 * d.torques[0] * x
     viscous = (0.3 + 0.7 * r[0]) * size * abs(d.ratio) / d.top_speed
     return {"output_coulomb" if same else "output_dry": size, "output_viscous": viscous}
 
 
-def sensor_ripple(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+def sensor_ripple(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     return {"sensor_ripple": 0.03 * d.torques[0] * x, "sensor_order": 2.0 if r[0] < 0.5 else 4.0,
             "sensor_phase": TURN * r[1], "sensor_second": 0.0 if same else 0.4}  # fmt: skip
 
