@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import Problem
 from hdsim.estimate.covariance import correlation
+from hdsim.estimate.determine import UNDETERMINED
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.found import Gap
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, undeclared
@@ -61,6 +61,7 @@ class Estimation:
         names: of the numbers that were fitted, as in ``correlation``.
         correlation: shape (f, f).
         directions: combinations of all free numbers that the data see or not, the best seen first.
+        left: part of its prior spread that is left of each fitted number.
         gap: held-out gap of each channel, before and after.
         readings: sensors' offsets and locked zeros, by record.
         problems: of the data.
@@ -75,6 +76,7 @@ class Estimation:
     names: list[str]
     correlation: Array
     directions: list[Direction]
+    left: dict[str, float]
     gap: dict[str, Gap]
     readings: list[Reading]
     problems: list[Problem]
@@ -134,19 +136,31 @@ def estimate(
     try:
         found = refit(bench, start, frees)
     except PredictionError as error:
-        names = ", ".join(record.name for record in records)
-        raise InputError(f"{names}: the model cannot follow the measured motion: {error}") from None
+        said = ", ".join(record.name for record in records)
+        raise InputError(f"{said}: the model cannot follow the measured motion: {error}") from None
     tell("proving on held-out data")
     states = {"before": start, "refit": found.fit.state, "after": found.fit.state}
     gap, predictions = gaps(bench, states)
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
-    own = len(found.fit.frees)
+    own = found.fit.frees
+    covariance, names = found.fit.covariance[: len(own), : len(own)], [each.name for each in own]
+    matrix = correlations(covariance)
+    spreads = np.sqrt(np.diag(covariance))
+    left = {each.name: min(float(s) / each.prior, 1.0) for each, s in zip(own, spreads, strict=True)}
+    groups = tied_groups(names, matrix)
+    for one in found.intervals:
+        # Where the end tells less of a number than the start promised, its prior is what bounds it.
+        if left.get(one.name, 0.0) > UNDETERMINED:
+            one.tied_to = [
+                name for group in groups if one.name in group for name in group if name != one.name
+            ]
     return Estimation(
         found.intervals,
-        [each.name for each in found.fit.frees],
-        correlations(found.fit.covariance[:own, :own]),
+        names,
+        matrix,
         _directions(bench, found.fit),
+        left,
         gap,
         _readings(bench, predictions["after"], begins),
         problems,
@@ -249,18 +263,17 @@ def _readings(bench: Bench, predictions: Sequence[Array], begins: Sequence[float
     return found
 
 
-def strongly_tied(names: Sequence[str], matrix: Array, least: float = 0.9) -> list[tuple[str, str, float]]:
-    """Pairs of numbers whose correlation is large, the largest first.
+def tied_groups(names: Sequence[str], matrix: Array, least: float = 0.9) -> list[list[str]]:
+    """Numbers of which only combinations are known well, in groups whose correlations chain them together.
 
     Args:
         names: of the numbers.
         matrix: their correlations, shape (f, f).
         least: least absolute correlation: at 0.9 one alone would be known more than twice as well.
     """
-    pairs = [
-        (names[j], names[k], float(matrix[j, k]))
-        for k in range(len(names))
-        for j in range(k)
-        if math.isfinite(matrix[j, k]) and abs(matrix[j, k]) >= least
-    ]
-    return sorted(pairs, key=lambda pair: -abs(pair[2]))
+    groups: list[list[int]] = []
+    for k in range(len(names)):
+        near = [group for group in groups if any(abs(matrix[j, k]) >= least for j in group)]
+        groups = [group for group in groups if group not in near]
+        groups.append(sorted({k, *(j for group in near for j in group)}))
+    return [[names[k] for k in group] for group in groups if len(group) > 1]

@@ -14,6 +14,8 @@ class FitNumber(FittedNumber):
 
     unit: str
     """Unit of its value, empty for a pure number."""
+    left: float | None = None
+    """Part of its prior spread that the data leave; above 0.5 they do not determine it."""
     scales: list[str] = []
     """Numbers of the scenario that scale together with it, itself among them."""
 
@@ -76,7 +78,7 @@ def result_of(found: Estimation) -> FitResult:
     """What ``fit.json`` holds."""
     paths = {free.name: list(free.paths) for free in found.refit.freedoms}
     return FitResult(
-        numbers={i.name: _number(i, paths.get(i.name, [])) for i in found.intervals},
+        numbers={i.name: _number(i, paths.get(i.name, []), found.left.get(i.name)) for i in found.intervals},
         moved=found.moved,
         correlation=Correlation(names=found.names, matrix=found.correlation.round(4).tolist()),
         directions=[Seen(spread=d.spread, seen=d.seen, parts=d.parts) for d in found.directions],
@@ -89,7 +91,7 @@ def result_of(found: Estimation) -> FitResult:
     )
 
 
-def _number(interval: Interval, paths: list[str]) -> FitNumber:
+def _number(interval: Interval, paths: list[str], left: float | None) -> FitNumber:
     known = interval.determined and math.isfinite(interval.low)
     return FitNumber(
         value=interval.value,
@@ -97,5 +99,6 @@ def _number(interval: Interval, paths: list[str]) -> FitNumber:
         start=interval.start,
         tied_to=interval.tied_to,
         unit=interval.unit,
+        left=left,
         scales=paths,
     )

@@ -99,6 +99,7 @@ def _show(result: FitResult) -> None:
     for path, number in result.numbers.items():
         if number.interval is not None:
             told = f"{shown(number.interval[0])} to {shown(number.interval[1])}"
+            told += " (its prior's)" if number.tied_to else ""
         else:
             told = "not determined"
             told += (

@@ -9,7 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hdsim.estimate.estimation import Estimation, strongly_tied
+from hdsim.estimate.determine import UNDETERMINED
+from hdsim.estimate.estimation import Estimation, tied_groups
 from hdsim.estimate.outcome import FitResult, result_of
 from hdsim.estimate.write import FITTED, scenario_text
 from hdsim.plot import units
@@ -46,7 +47,7 @@ def gap_rows(result: FitResult) -> list[list[str]]:
 
 def summary(result: FitResult) -> str:
     """The fit in a sentence."""
-    known = [name for name, number in result.numbers.items() if number.interval is not None]
+    known = [n for n in result.numbers.values() if n.left is not None and n.left <= UNDETERMINED]
     said = f"{len(known)} of {len(result.numbers)} numbers are determined by these data"
     if result.moved:
         said += f"; {len(result.moved)} differ from the model's: "
@@ -154,20 +155,21 @@ def _identifiable(found: Estimation) -> str:
     for direction in found.directions:
         parts = sorted(direction.parts.items(), key=lambda part: -abs(part[1]))
         text = ", ".join(f"{weight:+.2f} {named_number(name)[0]}" for name, weight in parts)
-        rows.append([text, f"{100 * direction.spread:.2g} %", "yes" if direction.seen else "no"])
+        rows.append(
+            [text, f"{shown(float(f'{100 * direction.spread:.2g}'))} %", "yes" if direction.seen else "no"]
+        )
     seen = sum(direction.seen for direction in found.directions)
     body = (
         f"<p>The data see {seen} of {len(found.directions)} combinations of the numbers (logarithms, in "
         "units of what was believed of each before).</p>"
         + table(("combination", "left of its prior spread", "determined"), rows, (1,))
     )
-    tied = strongly_tied(found.names, found.correlation)
-    if tied:
+    groups = tied_groups(found.names, found.correlation)
+    if groups:
         listed = "".join(
-            f"<li>{html.escape(named_number(a)[0])} and {html.escape(named_number(b)[0])}: {r:+.2f}</li>"
-            for a, b, r in tied
+            f"<li>{html.escape('; '.join(named_number(name)[0] for name in group))}</li>" for group in groups
         )
-        body += f"<p>Hard to tell from one another:</p><ul>{listed}</ul>"
+        body += f"<p>Known well only relative to one another:</p><ul>{listed}</ul>"
     return body
 
 

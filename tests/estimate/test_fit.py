@@ -76,6 +76,18 @@ def test_numbers_that_stand_in_for_one_another_are_told_apart_from_those_that_ar
     assert set(unseen[0].parts) == {arm, mass}
     assert math.prod(unseen[0].parts.values()) < 0  # one up, the other down
     assert len(result.correlation.names) == len(TRUTH)
+    assert all(number.left < 0.5 for name, number in result.numbers.items() if name != unknown[0])
+
+
+def test_a_sensitivity_that_only_its_prior_bounds_is_not_called_determined(tmp_path):
+    # Every torque of the model over the sensor's sensitivity: only products are measured.
+    result = result_of(hdsim.fit([record(0, 4.0)], model(tmp_path)))
+    gain = result.numbers["motor_torque_gain"]
+    assert gain.left is None or gain.left > 0.5
+    assert "drive.friction.coulomb_nm" in gain.tied_to
+    for name, true in TRUTH.items():
+        low, high = result.numbers[name].interval
+        assert low <= true <= high
     assert np.allclose(np.diag(result.correlation.matrix), 1.0)
 
 
