@@ -17,6 +17,7 @@ from hdsim.errors import HdsimError, InputError, PhysicsError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from hdsim.estimate.estimation import estimate as fit
     from hdsim.log import open_log
     from hdsim.log.importing import import_recording
     from hdsim.recording import Recording
@@ -30,6 +31,7 @@ __all__ = [
     "PhysicsError",
     "Recording",
     "Scenario",
+    "fit",
     "import_recording",
     "io_system",
     "linearize",
@@ -42,6 +44,7 @@ __all__ = [
 _HOMES = {
     "Recording": "hdsim.recording",
     "Scenario": "hdsim.scenario",
+    "fit": "hdsim.estimate.estimation:estimate",
     "import_recording": "hdsim.log.importing",
     "io_system": "hdsim.simulation.linear",
     "linearize": "hdsim.simulation.linear",
@@ -65,5 +68,6 @@ def __getattr__(name: str) -> Any:
     if name in _HOMES:
         from importlib import import_module
 
-        return getattr(import_module(_HOMES[name]), name)
+        home, _, own = _HOMES[name].partition(":")
+        return getattr(import_module(home), own or name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -38,6 +38,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
     "layout": ("hdsim.log.commands:layout", "Print a layout that shows a log in Foxglove."),
+    "fit": ("hdsim.tell.fit_commands:fit", "Fit a scenario's numbers to measured records."),
     "diagnose": (
         "hdsim.tell.commands:diagnose",
         "Find what a model is missing against measured records.",

@@ -42,6 +42,7 @@ def minimised(
     known: Array | None = None,
     evaluations: int = EVALUATIONS,
     rounds: int = ROUNDS,
+    tight: float = TIGHT,
     rough: bool = False,
 ) -> Minimum:
     """Least squares of the residual and of what the priors have against the numbers.
@@ -54,6 +55,7 @@ def minimised(
         known: sensitivities at the start to the first numbers, shape (rows, up to p), where known.
         evaluations: residuals that the optimiser may ask for in a round.
         rounds: most rounds, each with an exact Jacobian at its end.
+        tight: promised fall of the cost below which no further round begins.
         rough: one round, whose last Jacobian is good enough.
 
     Raises:
@@ -100,7 +102,7 @@ def minimised(
         free = found.active_mask == 0
         step, *_ = np.linalg.lstsq(whole[:, free], -found.fun, rcond=None)
         promised = np.sum(found.fun**2) - np.sum((found.fun + whole[:, free] @ step) ** 2)
-        if promised < TIGHT:
+        if promised < tight:
             break
         x0 = found.x
     return Minimum(found.x, found.fun[: len(start)] / worth, columns)

@@ -18,6 +18,8 @@ from hdsim.estimate.vector import Vector, sensitivities
 
 #: Part of what the number that can do most alone can do, for another to do as well.
 ALONE = 0.8
+#: Most fits under weights that follow from the one before, and factor between the weights that ends them.
+WEIGHINGS, ALIKE = 3, 1.5
 #: Part of what is left beside the noise below which the delays that leave it are believed at once.
 ALL = 0.1
 
@@ -87,14 +89,18 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
-    # Weights follow the residual: what the first fit explained no longer counts as noise.
+    # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
+    # still hold much of it leaves what the next one finds.
     reweigh(bench, found)
-    theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     undetermined, ties = found.undetermined, found.ties
-    slopes = found.columns, math.nan
-    found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes)
+    for _ in range(WEIGHINGS):
+        theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
+        slopes = found.columns, math.nan
+        found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes)
+        align(bench, found)
+        if reweigh(bench, found) < ALIKE:
+            break
     found.undetermined, found.ties = undetermined, ties
-    align(bench, found)
     if undetermined and found.frees:
         unknown = Vector(found.state, tuple(undetermined), 0)
         found.beside = sensitivities(bench, unknown, unknown.start(), found.predictions), unknown.priors()
@@ -103,10 +109,10 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         found.covariance = robust_covariance(
             found.columns, rest, bench.stacked_blocks(), priors, found.beside
         )
-    reweigh(bench, found)
     late = with_delays(bench, found)
     noise = sum(bench.noise_powers.values())
-    if late and bench.power(late.predictions) - noise < ALL * (bench.power(found.predictions) - noise):
+    left = bench.power(found.predictions) - noise
+    if late and left > 0 and bench.power(late.predictions) - noise < ALL * left:
         found = late
         reweigh(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
@@ -132,8 +138,12 @@ def align(bench: Bench, found: Fit) -> None:
         found.predictions = bench.predict(found.state)
 
 
-def reweigh(bench: Bench, found: Fit) -> None:
-    """Set the weights from what a fit leaves, and its sensitivities with them."""
+def reweigh(bench: Bench, found: Fit) -> float:
+    """Set the weights from what a fit leaves, and its sensitivities with them.
+
+    Returns:
+        Largest factor by which a training series' weight has risen.
+    """
     old = np.array([series.sigma for series in bench.series])
     bench.weigh(bench.residuals(found.predictions))
     new = np.array([series.sigma for series in bench.series])
@@ -142,3 +152,4 @@ def reweigh(bench: Bench, found: Fit) -> None:
         found.columns *= change
     if found.beside is not None:
         found.beside = found.beside[0] * change, found.beside[1]
+    return float(np.max(change, initial=1.0))

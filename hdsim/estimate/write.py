@@ -16,8 +16,23 @@ from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State, number_at
 from hdsim.nested import merge, put
 
+#: What a scenario that a diagnosis writes is called after its base's name, and what it says of itself.
+FOUND = (
+    "with what was found",
+    "Written by a diagnosis: the base, its numbers fitted to measured data, and effects.",
+)
+#: The same of one that a fit writes.
+FITTED = ("fitted", "Written by a fit: the base with its numbers fitted to measured data.")
 
-def scenario_text(base: Path, state: State, freedoms: Sequence[Free], start: State, beside: Path) -> str:
+
+def scenario_text(
+    base: Path,
+    state: State,
+    freedoms: Sequence[Free],
+    start: State,
+    beside: Path,
+    about: tuple[str, str] = FOUND,
+) -> str:
     """YAML of the scenario.
 
     Args:
@@ -26,12 +41,13 @@ def scenario_text(base: Path, state: State, freedoms: Sequence[Free], start: Sta
         freedoms: the base's numbers as they were.
         start: the base model.
         beside: the directory in which the scenario will stand.
+        about: what follows the base's name, and the description.
     """
     from hdsim.scenario.writer import to_yaml
 
     data: dict[str, Any] = {
-        "name": f"{base.stem} with what was found"[:200],
-        "description": "Written by a diagnosis: the base, its numbers fitted to measured data, and effects.",
+        "name": f"{base.stem} {about[0]}"[:200],
+        "description": about[1],
         "extends": os.path.relpath(base, beside),
     }
     for free in freedoms:

@@ -11,12 +11,13 @@ import hdsim.parts
 from hdsim import number
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Inverse, Periodic, Shape
+from hdsim.estimate.found import FittedNumber
 from hdsim.estimate.numbers import Free, base_freedoms, scaled, undeclared
 from hdsim.estimate.state import Added, number_at, state_of
 from hdsim.estimate.vector import Vector
 from hdsim.number import FIXED, Number
 from hdsim.scenario.fields import split_unit
-from hdsim.tell.wording import named_number
+from hdsim.tell.tables import numbers_table
 
 BASE = """
 name: base
@@ -92,7 +93,8 @@ def test_every_fitted_field_is_told_in_its_unit(name, fitting):
     for path, one in told.items():
         last = path.rpartition(".")[2]
         assert last in UNITS, f"add the unit of {name}.{path} to this test, from its docstring"
-        assert named_number(path)[1] == UNITS[last], path
+        row = numbers_table({path: FittedNumber(value=one.value)}).replace("μ", "µ")
+        assert f"<td>{UNITS[last]}</td>" in row.replace("<td>um</td>", "<td>µm</td>"), path
         assert math.isnan(one.low) or one.low <= one.value <= one.high
 
 

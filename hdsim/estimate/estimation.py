@@ -1,0 +1,279 @@
+"""Parameter estimation of a scenario from measured records: what a fit says, and how far to trust it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hdsim.errors import InputError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.check import Problem
+from hdsim.estimate.covariance import correlation
+from hdsim.estimate.determine import UNDETERMINED
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.found import Gap
+from hdsim.estimate.numbers import Free, Interval, base_freedoms, undeclared
+from hdsim.estimate.opening import bench_for, checked
+from hdsim.estimate.predict import LoadSource, PredictionError
+from hdsim.estimate.prove import gaps
+from hdsim.estimate.records import Array, Record
+from hdsim.estimate.refit import Refit, refit
+from hdsim.estimate.solution import Direction, correlations, directions
+from hdsim.estimate.state import State, state_of
+from hdsim.estimate.suspect import delays, suspicions
+from hdsim.estimate.vector import Vector, sensitivities
+
+if TYPE_CHECKING:
+    from hdsim.recording import Recording
+    from hdsim.scenario import Scenario
+
+#: Prior spread of the logarithm of a number that is asked for and that no field declares: a factor of two.
+ASKED_PRIOR = 0.7
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What belongs to one record alone.
+
+    Attributes:
+        record: its name.
+        held: whether only the proof has seen it.
+        offsets: measured less predicted, mean, of each channel, in SI units: the sensors' zeros.
+        zero: of a locked drive the motor's angle at which it carries nothing, beside where the record's own
+            torques put it, rad; None of one that turns.
+    """
+
+    record: str
+    held: bool
+    offsets: dict[str, float]
+    zero: float | None
+
+
+@dataclass
+class Estimation:
+    """A scenario's numbers as measured records have them.
+
+    Attributes:
+        intervals: every number that was free, with its 95 % interval, or what it is tied to.
+        names: of the numbers that were fitted, as in ``correlation``.
+        correlation: shape (f, f).
+        directions: combinations of all free numbers that the data see or not, the best seen first.
+        left: part of its prior spread that is left of each fitted number.
+        gap: held-out gap of each channel, before and after.
+        readings: sensors' offsets and locked zeros, by record.
+        problems: of the data.
+        bench: the measured series.
+        start: the model as given.
+        fit: the model as fitted.
+        refit: how it was fitted.
+        predictions: of all series, ``before`` and ``after``.
+    """
+
+    intervals: list[Interval]
+    names: list[str]
+    correlation: Array
+    directions: list[Direction]
+    left: dict[str, float]
+    gap: dict[str, Gap]
+    readings: list[Reading]
+    problems: list[Problem]
+    bench: Bench
+    start: State
+    fit: Fit
+    refit: Refit
+    predictions: dict[str, list[Array]]
+
+    @property
+    def moved(self) -> list[str]:
+        """Numbers whose start lies outside of their interval."""
+        return [interval.name for interval in self.intervals if interval.moved]
+
+
+def estimate(
+    measured: Sequence[Recording | Record],
+    scenario: Scenario,
+    *,
+    holdout: Sequence[Recording | Record] = (),
+    free: Collection[str] = (),
+    fix: Collection[str] = (),
+    apart: Collection[str] = (),
+    load: LoadSource | None = None,
+    force: bool = False,
+    on_step: Callable[[str], object] | None = None,
+) -> Estimation:
+    """Fit a scenario's numbers to measured records; this is ``hdsim.fit``.
+
+    The numbers are shared by all records; the sensors' offsets and the zero of a locked drive belong to each.
+
+    Args:
+        measured: records that the fit sees.
+        scenario: the model; what it commands does not matter, its motion is the measured one.
+        holdout: records that only the proof sees; parts of ``measured`` when there are none.
+        free: paths of the only numbers that move; all that the model declares when empty. Numbers of a group
+            that are named together scale together.
+        fix: paths of numbers that do not.
+        apart: paths of numbers of a group that move by themselves.
+        load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
+        force: go on in spite of errors in the data.
+        on_step: told what is being done.
+
+    Raises:
+        InputError: the data cannot answer the question, or are suspect (see ``force``), or a path is none.
+    """
+    tell = on_step or (lambda _: None)
+    tell("checking the data")
+    records, held, checks = checked(measured, scenario, holdout=holdout, force=force)
+    tell("predicting the measured channels")
+    bench, start = bench_for(records, held, scenario, load), state_of(scenario)
+    locked = all(predictor.plan.locked for predictor in bench.predictors)
+    known = base_freedoms(start, bench.channels, load_known=bench.load_known, locked=locked, apart=apart)
+    frees = chosen(start, known, free=free, fix=fix, apart=apart)
+    begins = [float(predictor.motor_angle[0]) for predictor in bench.predictors]
+    tell("fitting the numbers")
+    try:
+        found = refit(bench, start, frees)
+    except PredictionError as error:
+        said = ", ".join(record.name for record in records)
+        raise InputError(f"{said}: the model cannot follow the measured motion: {error}") from None
+    tell("proving on held-out data")
+    states = {"before": start, "refit": found.fit.state, "after": found.fit.state}
+    gap, predictions = gaps(bench, states)
+    problems = [problem for check in checks for problem in check.problems]
+    problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
+    own = found.fit.frees
+    covariance, names = found.fit.covariance[: len(own), : len(own)], [each.name for each in own]
+    matrix = correlations(covariance)
+    spreads = np.sqrt(np.diag(covariance))
+    left = {each.name: min(float(s) / each.prior, 1.0) for each, s in zip(own, spreads, strict=True)}
+    groups = tied_groups(names, matrix)
+    for one in found.intervals:
+        # Where the end tells less of a number than the start promised, its prior is what bounds it.
+        if left.get(one.name, 0.0) > UNDETERMINED:
+            one.tied_to = [
+                name for group in groups if one.name in group for name in group if name != one.name
+            ]
+    return Estimation(
+        found.intervals,
+        names,
+        matrix,
+        _directions(bench, found.fit),
+        left,
+        gap,
+        _readings(bench, predictions["after"], begins),
+        problems,
+        bench,
+        start,
+        found.fit,
+        found,
+        predictions,
+    )
+
+
+def chosen(
+    state: State,
+    known: Sequence[Free],
+    *,
+    free: Collection[str] = (),
+    fix: Collection[str] = (),
+    apart: Collection[str] = (),
+) -> list[Free]:
+    """The numbers that are to move.
+
+    Args:
+        state: the model.
+        known: those that it declares.
+        free: paths of the only ones that move; all when empty.
+        fix: paths of those that do not.
+        apart: paths that have to be among the known ones.
+
+    Raises:
+        InputError: a path is no number that could move; or none is left.
+    """
+    paths = {path for each in known for path in (each.paths or (each.name,))}
+    there = f"there are {', '.join(sorted(paths))}"
+    extra: list[Free] = []
+    for path in [*free, *fix, *apart]:
+        if path in paths:
+            continue
+        more = undeclared(state, path, ASKED_PRIOR) if path in free else None
+        if more is None:
+            raise InputError(
+                f"{path}: no number of this model above zero that these data could tell; {there}"
+            )
+        extra.append(more)
+    both = sorted(set(free) & set(fix))
+    if both:
+        raise InputError(f"{both[0]}: both free and fixed")
+    found = [_without(state, each, free, fix) for each in [*known, *extra]]
+    left = [each for each in found if each is not None]
+    if not left:
+        raise InputError(f"no number is left to fit: {there}")
+    return left
+
+
+def _without(state: State, free: Free, only: Collection[str], fix: Collection[str]) -> Free | None:
+    """A number without those of its group that do not move."""
+    if free.reading:
+        return free if free.name not in fix and (not only or free.name in only) else None
+    paths = tuple(path for path in free.paths if path not in fix and (not only or path in only))
+    if not paths:
+        return None
+    if paths == free.paths:
+        return free
+    first = undeclared(state, paths[0], free.prior)
+    assert first is not None, "it was found with the group"
+    return replace(free, name=first.name, paths=paths, value=first.value, least=first.least, most=first.most)
+
+
+def _directions(bench: Bench, found: Fit) -> list[Direction]:
+    """What the data see of the free numbers at the end of the fit."""
+    columns, frees = found.columns[:, : len(found.frees)], [*found.frees, *found.undetermined]
+    if found.undetermined:
+        beside = found.beside[0] if found.beside is not None else None
+        if beside is None:
+            unknown = Vector(found.state, tuple(found.undetermined), 0)
+            beside = sensitivities(bench, unknown, unknown.start(), found.predictions)
+        columns = np.hstack([columns, beside])
+    rest = bench.stacked(bench.residuals(found.predictions))
+    power = max(float(np.mean(rest**2)), 1e-30) * correlation(rest, bench.stacked_blocks())
+    priors = np.array([free.prior for free in frees])
+    return directions(columns, priors, power, [free.name for free in frees])
+
+
+def _readings(bench: Bench, predictions: Sequence[Array], begins: Sequence[float]) -> list[Reading]:
+    """Sensors' offsets and locked zeros of every record.
+
+    Args:
+        bench: the measured series.
+        predictions: of all of them.
+        begins: the prescribed motor angle at each record's first sample before the fit, rad.
+    """
+    found = []
+    for k, (predictor, begin) in enumerate(zip(bench.predictors, begins, strict=True)):
+        offsets = {}
+        for series, predicted in zip(bench.series, predictions, strict=True):
+            seen = series.train if series.train.any() else series.hold
+            if series.record == k and len(predicted) and seen.any():
+                offsets[series.channel] = float(np.mean((series.measured - predicted)[seen]))
+        zero = float(predictor.motor_angle[0]) - begin if predictor.plan.locked else None
+        found.append(Reading(predictor.record.name, k >= bench.training, offsets, zero))
+    return found
+
+
+def tied_groups(names: Sequence[str], matrix: Array, least: float = 0.9) -> list[list[str]]:
+    """Numbers of which only combinations are known well, in groups whose correlations chain them together.
+
+    Args:
+        names: of the numbers.
+        matrix: their correlations, shape (f, f).
+        least: least absolute correlation: at 0.9 one alone would be known more than twice as well.
+    """
+    groups: list[list[int]] = []
+    for k in range(len(names)):
+        near = [group for group in groups if any(abs(matrix[j, k]) >= least for j in group)]
+        groups = [group for group in groups if group not in near]
+        groups.append(sorted({k, *(j for group in near for j in group)}))
+    return [[names[k] for k in group] for group in groups if len(group) > 1]

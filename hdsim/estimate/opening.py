@@ -1,0 +1,60 @@
+"""Measured records checked and made comparable: what every fit begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hdsim.errors import InputError
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.check import Check, check_record
+from hdsim.estimate.predict import LoadSource, predictors
+from hdsim.estimate.records import Record, record_from
+
+if TYPE_CHECKING:
+    from hdsim.recording import Recording
+    from hdsim.scenario import Scenario
+
+
+def checked(
+    measured: Sequence[Recording | Record],
+    scenario: Scenario,
+    *,
+    holdout: Sequence[Recording | Record] = (),
+    force: bool = False,
+) -> tuple[list[Record], list[Record], list[Check]]:
+    """Training records, held-out records, and what is wrong with them.
+
+    Raises:
+        InputError: there is none, or one contradicts itself (see ``force``).
+    """
+    records, held = (
+        [r if isinstance(r, Record) else record_from(r) for r in many] for many in (measured, holdout)
+    )
+    if not records:
+        raise InputError("no measured record is given")
+    checks = [check_record(record, scenario.drive.ratio) for record in [*records, *held]]
+    errors = [problem for check in checks for problem in check.errors]
+    if errors and not force:
+        lines = "\n".join(f"{p.record}: {p.channel}: {p.kind}: {p.message}" for p in errors)
+        raise InputError(f"{lines}\nmend the mapping or the data, or go on in spite of it (--force)")
+    return records, held, checks
+
+
+def bench_for(
+    records: Sequence[Record], held: Sequence[Record], scenario: Scenario, load: LoadSource | None = None
+) -> Bench:
+    """The records with their predictors.
+
+    Args:
+        records: that fits may see.
+        held: that only the proof sees; parts of the others when there are none.
+        scenario: the model.
+        load: where the load's torque comes from.
+
+    Raises:
+        InputError: nothing can be predicted.
+    """
+    ratio, locked = scenario.drive.ratio, scenario.command.output.type == "locked"
+    training = predictors(records, ratio, load=load, output_locked=locked)
+    return Bench(training, predictors(held, ratio, load=load, output_locked=locked))

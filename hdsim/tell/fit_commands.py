@@ -1,0 +1,122 @@
+"""``hdsim fit``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hdsim.tell.commands import _DATA, _FILE
+
+if TYPE_CHECKING:
+    from hdsim.estimate.outcome import FitResult
+
+
+@click.command()
+@click.argument("measured", nargs=-1, required=True, type=_DATA)
+@click.option("--model", required=True, type=_FILE, help="Scenario whose numbers are fitted.")
+@click.option("--mapping", type=_FILE, help="What the columns mean; a log of hdsim needs none.")
+@click.option("--holdout", multiple=True, type=_DATA, help="Records that only the proof sees.")
+@click.option(
+    "--free", multiple=True, metavar="PATH", help="A number that moves; without it all declared ones."
+)
+@click.option("--fix", multiple=True, metavar="PATH", help="A number that does not move.")
+@click.option("--apart", multiple=True, metavar="PATH", help="A number of a group that moves by itself.")
+@click.option(
+    "--out", required=True, type=click.Path(file_okay=False, path_type=Path), help="Where to write."
+)
+@click.option(
+    "--load",
+    type=click.Choice(["scenario", "load_torque", "output_torque"]),
+    help="Where the load's torque comes from [load_torque when measured, else scenario].",
+)
+@click.option("--force", is_flag=True, help="Go on in spite of errors in the data.")
+def fit(
+    measured: tuple[Path, ...],
+    model: Path,
+    mapping: Path | None,
+    holdout: tuple[Path, ...],
+    free: tuple[str, ...],
+    fix: tuple[str, ...],
+    apart: tuple[str, ...],
+    out: Path,
+    load: Any,
+    force: bool,
+) -> int:
+    """Fit a scenario's numbers to measured records.
+
+    Gives every number with its 95 % interval, or says what it cannot be told from; numbers are shared by all
+    records, sensors' offsets belong to each. PATH is a number's place in the scenario, such as
+    drive.friction.coulomb_nm.
+    """
+    import hdsim
+    from hdsim.estimate.outcome import result_of
+    from hdsim.estimate.records import record_from
+    from hdsim.tell.fit_report import save_fit
+    from hdsim.tell.staging import staged
+    from hdsim.tell.terminal import Progress
+
+    for path in holdout:
+        if path.resolve() in {p.resolve() for p in measured}:
+            raise hdsim.InputError(f"--holdout: {path} is also a measured record, which the fit sees")
+    scenario = hdsim.load_scenario(model)
+    # Better known now than after the fit.
+    with staged(out, keep=False):
+        pass
+    records, held = (
+        [record_from(hdsim.import_recording(path, mapping), path.name) for path in paths]
+        for paths in (measured, holdout)
+    )
+    with Progress() as tell:
+        found = hdsim.fit(
+            records, scenario, holdout=held, free=free, fix=fix, apart=apart, load=load, force=force,
+            on_step=tell,
+        )  # fmt: skip
+        tell("writing the report")
+        page = save_fit(found, model, out)
+    _show(result_of(found))
+    click.echo(f"report   {page}")
+    click.echo(f"scenario {out / 'fitted.yaml'}")
+    return 0
+
+
+def _show(result: FitResult) -> None:
+    """Print the numbers, the gaps and what needs attention."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    from hdsim.console import console
+    from hdsim.tell.fit_report import GAP_HEAD, gap_rows, summary
+    from hdsim.tell.wording import named_number, shown
+
+    out = console()
+    out.print(Text(summary(result)), highlight=False)
+    numbers = Table(box=SIMPLE_HEAD)
+    for k, name in enumerate(("number", "unit", "model", "fitted", "95 % interval")):
+        numbers.add_column(name, justify="right" if k in (2, 3) else "left")
+    for path, number in result.numbers.items():
+        if number.interval is not None:
+            told = f"{shown(number.interval[0])} to {shown(number.interval[1])}"
+            told += " (its prior's)" if number.tied_to else ""
+        else:
+            told = "not determined"
+            told += (
+                f", tied to {', '.join(named_number(n)[0] for n in number.tied_to)}" if number.tied_to else ""
+            )
+        words, unit = named_number(path)
+        start = "" if number.start is None else shown(number.start)
+        style = "bold" if path in result.moved else ""
+        numbers.add_row(words, unit, start, shown(number.value), told, style=style)
+    out.print(numbers)
+    gaps = Table(box=SIMPLE_HEAD, title="RMS difference on held-out data", title_justify="left")
+    for name in GAP_HEAD:
+        gaps.add_column(name, justify="left" if name in GAP_HEAD[:2] else "right")
+    for row in gap_rows(result):
+        gaps.add_row(*row)
+    out.print(gaps)
+    for problem in result.data_problems:
+        if problem.severity != "info":
+            said = f"{problem.severity}: {problem.record}: {problem.channel}: {problem.message}"
+            out.print(Text(said, style="yellow"), highlight=False)
