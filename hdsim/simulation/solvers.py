@@ -1,4 +1,4 @@
-"""Every integration of hdsim goes through here, and through ``scipy.integrate.solve_ivp``.
+"""Every run of hdsim goes through here, and through ``scipy.integrate.solve_ivp``; fits: see ``sample``.
 
 The methods are SciPy's own and ``hdsim.simulation.rosenbrock.Rodas4``. Whatever stops a run (a step that
 gets too small, a number that is not finite, Ctrl-C, an error in the caller's ``on_step``) is reported in

@@ -392,7 +392,7 @@ def test_a_missing_or_binary_file_is_refused(tmp_path):
 
 
 def test_pieces_of_any_spacing_are_found_as_by_a_plain_search():
-    """Against SciPy's piecewise polynomials, at and beside every knot: even, clustered and double ones."""
+    """Against SciPy's piecewise polynomials, at and beside every knot: even, clustered, random and few ones."""
     from scipy.interpolate import CubicSpline
 
     rng = np.random.default_rng(4)
@@ -405,7 +405,9 @@ def test_pieces_of_any_spacing_are_found_as_by_a_plain_search():
         move = Move((segment,), float(starts[-1]), 0.0, float(spline(starts[-1])))
         found = SignalData(move)
         inner = starts[1:-1]
-        times = np.concatenate([starts[:-1], np.nextafter(inner, 9.0), rng.uniform(0.3, starts[-1], 500)])
+        times = np.concatenate(
+            [starts[:-1], np.nextafter(inner, 9.0), rng.uniform(starts[0], starts[-1], 500)]
+        )
         values = found.values(times)
         for order in range(3):
             size = np.abs(spline(starts, order)).max()

@@ -1,0 +1,159 @@
+"""A prediction of a diagnosis against the public run of the same model: processor time, error, threads.
+
+    python benchmarks/prediction.py [SECONDS]
+
+A record of SECONDS (20) at 1 kHz with an encoder's noise is prescribed to a size 20 drive; asked for are the
+torques and the output's angle. ``run`` is ``Run(...).record()``: all channels, events, energy audit, SciPy's
+loop. ``predict`` is ``Predictor.predict``, which a diagnosis calls up to a thousand times. Costs are
+processor seconds, the shortest of several; errors the largest relative root-mean-square error of a channel
+against a run at 1e-11. The last columns are wall seconds of sixteen models in one thread and in two.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from hdsim.drive.model import Model
+from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor, plan_for
+from hdsim.estimate.records import Record
+from hdsim.scenario import Scenario
+from hdsim.simulation.run import Run
+
+TOLERANCES = (1e-5, 1e-6, 1e-7)
+RIPPLE = {"motor_torque_ripple": {"components": [{"order": 12, "cogging_nm": 0.03}]}}
+CASES = {
+    "lumped": ("lumped", {}),
+    "lumped, torque ripple": ("lumped", RIPPLE),
+    "lumped, kinematic error": ("lumped", {"kinematic_error": {}}),
+    "lumped, Maxwell hysteresis": ("lumped", {"torsional_hysteresis_maxwell": {}}),
+    "rigid": ("rigid", {}),
+    "tabulated": ("tabulated", {}),
+}  # fmt: skip
+MANY = 16
+
+
+def record_of(seconds: float) -> Record:
+    """A swing of the output by 45 degrees, as encoders and sensors show it."""
+    times = np.arange(round(1000 * seconds) + 1) / 1000
+    angle = -100.0 * math.radians(45) * np.sin(2 * np.pi * 0.25 * times)
+    rng = np.random.default_rng(0)
+    channels = {"motor_angle": angle, "output_angle": angle / -100.0}
+    channels |= {"motor_torque": np.cos(times), "output_torque": np.cos(times)}
+    noise = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3, "output_torque": 0.15}
+    return Record(
+        "benchmark", times, {c: v + noise[c] * rng.standard_normal(len(times)) for c, v in channels.items()}
+    )
+
+
+def candidate_of(mesh: str, effects: dict[str, object]) -> Candidate:
+    """A model with an arm on its output."""
+    scenario = Scenario.model_validate({
+        "drive": {"preset": "csg-20-100", "mesh": {"model": mesh}},
+        "effects": effects,
+        "command": {"motor": {"type": "free"}},
+        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
+        "run": {"duration_s": 1.0},
+    })  # fmt: skip
+    return Candidate(scenario.drive, scenario.effects.active(), scenario.load)
+
+
+def run_of(predictor: Predictor, candidate: Candidate, rtol: float) -> dict[str, np.ndarray]:
+    """The predicted channels from the public way of simulating."""
+    model = Model(
+        candidate.drive,
+        [*candidate.effects.values(), candidate.load],
+        load_inertia_kg_m2=candidate.load.inertia_kg_m2,
+        motions={"motor": predictor.motion},
+    )
+    run = Run(model, duration_s=LEAD_IN_S + predictor.record.duration_s, sample_rate_hz=1000.0, rtol=rtol)
+    recorded = run.record()
+    count = len(predictor.record.time)
+    return {channel: recorded[channel][-count:] for channel in predictor.plan.channels}
+
+
+def cheapest(call, repeats: int) -> float:
+    """Processor seconds of a call."""
+    spent = []
+    for _ in range(repeats):
+        began = time.process_time()
+        call()
+        spent.append(time.process_time() - began)
+    return min(spent)
+
+
+def error(found: dict[str, np.ndarray], exact: dict[str, np.ndarray]) -> float:
+    """Largest relative root-mean-square error of a channel; the first samples hold a jump of the motion."""
+    return max(float(np.std((found[c] - exact[c])[5:]) / np.std(exact[c])) for c in exact)
+
+
+def at_equal_error(costs: list[float], errors: list[float], wanted: float) -> float:
+    """Cost at an error, interpolated on logarithmic axes; nan outside."""
+    if not min(errors) <= wanted <= max(errors):
+        return math.nan
+    order = np.argsort(errors)
+    return float(np.exp(np.interp(np.log(wanted), np.log(errors)[order], np.log(costs)[order])))
+
+
+def row(record: Record, name: str) -> list[str]:
+    """A line of the table."""
+    mesh, effects = CASES[name]
+    candidate = candidate_of(mesh, effects)
+    predictor = Predictor(record, plan_for(record), candidate.drive.ratio)
+    repeats = 1 if mesh == "tabulated" else 5
+    exact = run_of(predictor, candidate, 1e-8 if mesh == "tabulated" else 1e-11)
+    costs: dict[str, list[float]] = {"run": [], "predict": []}
+    errors: dict[str, list[float]] = {"run": [], "predict": []}
+    for rtol in TOLERANCES:
+        predictor.rtol = rtol
+        ways = {
+            "run": partial(run_of, predictor, candidate, rtol),
+            "predict": partial(predictor.predict, candidate),
+        }
+        for way, call in ways.items():
+            errors[way].append(max(error(call(), exact), 1e-14))
+            costs[way].append(cheapest(call, repeats))
+    predictor.rtol = TOLERANCES[1]
+    seconds = []
+    for threads in (1, 2):
+        began = time.perf_counter()
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(predictor.predict, [candidate] * MANY))
+        seconds.append(time.perf_counter() - began)
+    run, predict, wanted = costs["run"][1], costs["predict"][1], errors["run"][1]
+    equal = run / at_equal_error(costs["predict"], errors["predict"], wanted)
+    return [
+        name,
+        f"{1e3 * run:.1f}",
+        f"{1e3 * predict:.1f}",
+        f"{run / predict:.1f}",
+        f"{wanted:.1e}",
+        f"{errors['predict'][1]:.1e}",
+        "-" if math.isnan(equal) else f"{equal:.1f}",
+        *(f"{value:.2f}" for value in seconds),
+    ]
+
+
+def main() -> None:
+    """Measure and print."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
+    record = record_of(seconds)
+    table = Table(title=f"{seconds:g} s at 1 kHz, processor ms at a tolerance of 1e-6")
+    titles = ("run", "predict", "ratio", "error run", "predict", "ratio at equal error")
+    table.add_column("model")
+    for title in (*titles, f"{MANY} in one thread, s", "in two, s"):
+        table.add_column(title, justify="right")
+    for name in CASES:
+        table.add_row(*row(record, name))
+    Console(width=150).print(table)
+
+
+if __name__ == "__main__":
+    main()
