@@ -38,8 +38,8 @@ dissipative and every spring stores what it takes: the tests check it for each e
 its derivatives too. sign(w) of speed-dependent friction is `tanh(w / smoothing velocity)`: below that speed
 the drive creeps instead of sticking; LuGre friction and hysteresis have states instead and stick.
 
-*Usually* is where an engineer expects a number before a measurement, no bound; T_N is the rated torque, K1
-the drive's first stiffness. What no number can be, the field refuses.
+*Usually* is where an engineer expects a number before a measurement, and no bound; T_N is the rated torque,
+K1 the drive's first stiffness. What no number can be, the field refuses.
 
 A new effect is a new file with one subclass of `hdsim.parts.Effect`. This page is printed by
 `python -m hdsim.effects`.

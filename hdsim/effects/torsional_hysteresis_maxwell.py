@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
@@ -24,8 +25,13 @@ def maxwell_slip(inputs: Any, parameters: Any, own: int, columns: int, outputs: 
         slip = 0.0
         slip_force = 0.0
         if force * speed > 0.0:
-            slip = (abs(force) / parameters[3 + 2 * i]) ** power
-            slip_force = power * slip / force
+            # From 0 below W (1 - 1/p) to 1 at W, with a continuous slope.
+            into = 1.0 + power * (abs(force) / parameters[3 + 2 * i] - 1.0)
+            if into >= 1.0:
+                slip = 1.0
+            elif into > 0.0:
+                slip = into * into * (3.0 - 2.0 * into)
+                slip_force = 6.0 * into * (1.0 - into) * power / math.copysign(parameters[3 + 2 * i], force)
         outputs[TWIST_TORQUE] -= force
         jacobian[TWIST_TORQUE * columns + state] -= 1.0
         outputs[state] += stiffness * speed * (1.0 - slip)
@@ -47,12 +53,14 @@ class SlipElement(Parameters):
 
 
 class TorsionalHysteresisMaxwell(Effect):
-    """tau = sum F_i, dF/dt = k w (1 - |F/W|^p (1 + sign(F w))/2), w the rate of twist.
+    """tau = sum F_i, dF/dt = k w (1 - s), w the rate of twist; s rises from 0 to 1 as |F| nears W.
 
-    Rate-independent. As p grows, an element becomes the ideal one: elastic up to W, then slipping. The law
-    keeps |F| < W, stores F^2/(2 k) and turns F w |F/W|^p into heat while it slips. With a finite p a minor
-    loop does not close exactly: cycling relaxes F toward smaller values. At p = 12 a full loop has the
-    ideal area within 0.5 % and its branches follow Masing's rule within 2 % of the total slip torque.
+    On the way up (F w > 0) s is the smooth step of 1 + p (|F|/W - 1): nothing slips below W (1 - 1/p), all
+    of it at W; on the way back s = 0. Rate-independent. As p grows an element becomes the ideal one, elastic
+    up to W, then slipping. The law keeps |F| < W, stores F^2/(2 k) and turns F w s into heat. Below
+    W (1 - 1/p) an element is exactly elastic, so loops close and a bias stays, however often it is cycled:
+    what an element can lose is 1/p of its torque. (Without that threshold, as in Bouc-Wen's |F/W|^p, every
+    cycle under a bias takes a part of it.)
 
     Without ``elements``, ``slip_torque_nm`` is shared equally by elements that slip at ``slip_twists_mrad``.
     The elements stiffen the drive on reversal by sum k_i; a catalogue stiffness contains that already.
@@ -61,8 +69,8 @@ class TorsionalHysteresisMaxwell(Effect):
     title: ClassVar[str] = "torsional hysteresis (Maxwell slip)"
     source: ClassVar[str] = (
         "Tjahjowidodo, Al-Bender and Van Brussel 2013, Mechatronics 23:497 (spring plus Maxwell slip); "
-        "smooth slip: Bouc-Wen form, Wen 1976, J. Eng. Mech. Div. 102:249; level: catalogue hysteresis loss"
-        " below 1 arcmin times K1, 2 sum W <= 4.6 N m for size 20"
+        "no slip below a threshold: Iwan 1966, J. Appl. Mech. 33:893 (elements of ideal friction); level: "
+        "catalogue hysteresis loss below 1 arcmin times K1, 2 sum W <= 4.6 N m for size 20"
     )
     signature: ClassVar[Signature] = Signature(
         lives_in=("torque", "time_since_reversal", "direction"),
@@ -93,8 +101,9 @@ class TorsionalHysteresisMaxwell(Effect):
     """Total torque of all sliders, N m: half of the loop's width in torque, at full slip."""
     slip_twists_mrad: tuple[float, ...] = Field((0.1, 0.3, 0.8), min_length=1)
     """Twists at which equal shares of the torque slip, from rest, mrad."""
-    sharpness: Annotated[float, FIXED] = Field(12.0, ge=1, le=100)
-    """Exponent p: how suddenly an element slips; above about 20 it asks for small steps."""
+    # Beyond a thousand a solver sees a corner.
+    sharpness: Annotated[float, FIXED] = Field(200.0, ge=1, le=1000)
+    """Inverse p of the share of W over which an element begins to slip."""
 
     @model_validator(mode="after")
     def _positive(self) -> TorsionalHysteresisMaxwell:

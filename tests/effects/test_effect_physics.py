@@ -199,7 +199,7 @@ def test_maxwell_loop_has_the_area_of_ideal_elastoplastic_elements() -> None:
     given = tuple(SlipElement(stiffness_nm_per_rad=a, slip_torque_nm=b) for a, b in elements)
     amplitude = 1e-3
     ideal = sum(4 * w * (amplitude - w / s) for s, w in elements)
-    for sharpness, tolerance in ((12.0, 0.01), (100.0, 0.001)):
+    for sharpness, tolerance in ((12.0, 0.02), (200.0, 0.001)):
         x, f = cycle(TorsionalHysteresisMaxwell(elements=given, sharpness=sharpness), amplitude)
         area = abs(np.trapezoid(f[1600:], x[1600:]))  # second cycle: x and F close
         assert area == pytest.approx(ideal, rel=tolerance)
@@ -212,7 +212,7 @@ def test_maxwell_is_rate_independent_and_never_exceeds_its_slip_torque() -> None
     assert 0.99 * 2.0 < np.abs(slow).max() < 2.0 + 1e-8
 
 
-@pytest.mark.parametrize(("sharpness", "tolerance"), [(12, 0.02), (100, 0.003)])
+@pytest.mark.parametrize(("sharpness", "tolerance"), [(12, 0.03), (200, 0.002)])
 def test_maxwell_obeys_masing(sharpness: float, tolerance: float) -> None:
     """After a reversal the branch is the virgin curve, doubled in both directions (Masing 1926)."""
     effect = TorsionalHysteresisMaxwell(sharpness=sharpness)

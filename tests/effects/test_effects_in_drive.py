@@ -47,3 +47,32 @@ def test_a_play_that_is_taken_up_at_once_is_the_gap(tmp_path: Path) -> None:
     assert np.ptp(torques[0]) > 20
     assert np.mean(np.abs(torques[0]) < 0.1) > 0.1  # the play
     np.testing.assert_allclose(torques[1], torques[0], atol=2e-3 * np.max(np.abs(torques[0])))
+
+
+def test_a_hysteresis_loop_closes_under_a_bias(tmp_path: Path) -> None:
+    """490 cycles of 7 to 13 N m: ideal elements lose nothing after the first, these 1/sharpness at most."""
+    path = tmp_path / "bias.yaml"
+    path.write_text(
+        "drive: {preset: csg-20-100, mesh: {model: lumped}}\n"
+        "command: {motor: {type: motion, trajectory: {type: hold, angle_deg: 0}}}\n"
+        "load:\n"
+        "  inertia_kg_m2: 0.05\n"
+        "  torque: {type: sine, amplitude_nm: 3, offset_nm: 10, frequency_hz: 5}\n"
+        "effects: {torsional_hysteresis_maxwell: {}}\n"
+        "run: {duration_s: 98, sample_rate_hz: 200}\n",
+        encoding="utf-8",
+    )
+    scenario = hdsim.load_scenario(path)
+    found = hdsim.simulate(scenario)
+    effect = scenario.effects.active()["torsional_hysteresis_maxwell"]
+
+    def cycles(channel: str) -> np.ndarray:
+        """Mean of each cycle once the start has died away."""
+        return found[channel][:-1].reshape(-1, 40).mean(axis=1)[5:]
+
+    drift = cycles("output_angle")[-1] - cycles("output_angle")[0]
+    assert abs(np.degrees(drift)) * 3600 < 0.05
+    assert np.ptp(found["output_angle"]) > 1e-4
+    for k, element in enumerate(effect.slip_elements(), 1):
+        torque = cycles(f"slip_element_{k}_torque")
+        assert abs(torque[-1] - torque[0]) < element.slip_torque_nm / effect.sharpness
