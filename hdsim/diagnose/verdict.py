@@ -21,7 +21,8 @@ class NamedEffect(Part):
     title: str = ""
     """The field's term for it."""
     confidence: float = Field(ge=0, le=1)
-    """Probability that it, or its group, is right; calibrated on blind cases."""
+    """Probability that it, or its group, is right: the odds that ``because`` adds up. The rules' own fields
+    say what calibrated them."""
     chance: float = Field(ge=0, le=1)
     """Probability that the whole search finds such a share where nothing is missing."""
     explained: float
@@ -70,13 +71,13 @@ class Verdict(Part):
     version: int = VERSION
     """Version of this layout."""
     verdict: Literal["nothing", "parameter", "effect", "unknown"]
-    """``unknown``: structure is left that nothing in the catalogue explains."""
+    """``unknown``: something is there, and no name for it is likely enough to be given."""
     sentence: str
     """The verdict in words."""
     effects: list[NamedEffect] = []
     """Named effects in the order in which they were found."""
     suspects: dict[str, float] = {}
-    """For ``unknown``: effects that explain a part, with the share, none of them enough to be named."""
+    """For ``unknown``: effects that explain a part, with the share, none likely enough to be named."""
     parameters: dict[str, FittedNumber] = {}
     """The base model's own numbers, fitted."""
     moved: list[str] = []
@@ -91,12 +92,13 @@ class Verdict(Part):
     not_tried: dict[str, str] = {}
     """Effects of the catalogue that could not be tried, with the reason."""
     curve: CurveFound | None = None
-    """What is left as a curve over the coordinate that explains it best: for ``unknown`` all of it, beside
-    names what they leave."""
+    """What is left as a curve over the coordinate that explains it best: for ``unknown`` all of it, and the
+    scenario has it; beside names what they leave, and the scenario has it not."""
     remainder: Remainder | None = None
     """For ``unknown``: what is left without a place, as what happens once."""
     because: list[Reason] = []
-    """Every rule that was asked, with what was seen and its limit."""
+    """Every rule that was asked, with what was seen: of a name (``of``) what each piece of evidence adds to
+    the logarithm of its odds and the probability that comes out; of the whole, limits."""
     next_experiment: NextExperiment | None = None
     """What to measure next, where these data leave names that they cannot tell apart."""
     scenario: str | None = None

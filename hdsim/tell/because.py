@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from hdsim.diagnose.decide import Reason
-from hdsim.tell.words import below, percent, short, started
+from hdsim.tell.words import below, percent, short, started, times
 
 Side = Literal["at least", "at most", "more than", ""]
 
@@ -27,10 +27,6 @@ def _part(share: float) -> str:
     if not math.isfinite(share) or 0.0 <= share <= 1.0:
         return percent(share)
     return f"{round(100 * share)}\u00a0%".replace("-", "−")
-
-
-def _times(value: float) -> str:
-    return f"{short(value, 2)} times"
 
 
 #: By the rule's own name, as ``decide`` has it.
@@ -56,7 +52,7 @@ WORDINGS = {
         "part of what is left that is a pattern", _part, "at least"
     ),
     "what is left, in units of the noise": Wording(
-        "what is left of the worst channel, in units of its noise", _times, "more than"
+        "what is left of the worst channel, in units of its noise", times, "more than"
     ),
     "the re-fit closes a held-out gap": Wording(
         "part of a held-out gap that the re-fitted numbers close", _part, "at least"

@@ -148,6 +148,7 @@ def _head(found: Findings) -> str:
         f"class='kind'>{KINDS[verdict.verdict]}</p><h1{long}>{html.escape(said)}</h1><div "
         f"class='facts'><div><h2>How sure</h2><p class='big'>{html.escape(sure.words)}: <span "
         f"class='number'>{html.escape(sure.number)}</span></p>"
+        + (f"<p class='left'>But {html.escape(sure.left)}.</p>" if sure.left else "")
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)
         + f"</div><div><h2>What it "
         f"means</h2><p>{html.escape(meaning(found))}</p>{_pointers(verdict)}</div><div><h2>What it "

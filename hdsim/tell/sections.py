@@ -82,11 +82,11 @@ def curve(found: Findings, picture: str) -> str:
     )
     what = f"<b>{html.escape(started(curve.words))}</b>"
     if named:
-        part = f"{percent(found.unexplained)} of it" if found.unexplained > 0 else "A part of it"
-        body = (
-            f"<p>{part} follows another shape than the named law has. {what} explains {checked}. The curve "
-        )
-        body += "is shown only: found.yaml holds the named effects without it.</p>"
+        part = "A part of it"
+        if found.unexplained > 0:
+            part = f"{percent(found.unexplained)} of it (of the structure that the re-fitted model left)"
+        body = f"<p>{part} follows another shape than the named law. {what} explains {checked}. The curve is "
+        body += "shown only: found.yaml holds the named effects without it.</p>"
     else:
         body = f"<p>{what} explains {checked}.</p>"
     body += (

@@ -77,7 +77,10 @@ def numbers_table(
         if settings is not None and name.endswith(".order"):
             continue  # it names the harmonic in the other rows
         words, unit = named_number(name, settings)
-        cells = [f"<td>{html.escape(words)}<code>{html.escape(name)}</code></td>", f"<td>{unit}</td>"]
+        cells = [
+            f"<td>{html.escape(words)}<code>{html.escape(name)}</code></td>",
+            f"<td class='u'>{unit}</td>",
+        ]
         if based:
             start = "" if n.start is None else shown(n.start)
             moved_by = 100 * (n.value / n.start - 1) if n.start else 0.0

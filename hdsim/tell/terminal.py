@@ -84,7 +84,7 @@ def show(found: Findings, terminal: Console | None = None) -> None:
 
     line((verdict.verdict, f"bold {_COLOURS[verdict.verdict]}"), ": ", (KINDS[verdict.verdict], "bold"))
     line(headline(found))
-    line(f"{sure.words}: {sure.number}.", "")
+    line(sure.sentence)
     if verdict.gap:
         table = Table(box=SIMPLE_HEAD, title="\nRMS difference on held-out data", **_STYLE)
         for name in _HEAD:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hdsim.diagnose.name import LEVEL
 from hdsim.diagnose.rules import RULES
-from hdsim.diagnose.verdict import Verdict
+from hdsim.diagnose.verdict import NamedEffect, Verdict
 from hdsim.estimate.found import FittedNumber
 from hdsim.tell.because import weighings
 from hdsim.tell.findings import Findings
@@ -21,6 +21,7 @@ from hdsim.tell.words import (
     shown,
     spoken,
     started,
+    times,
     title_of,
     titles_of,
     unit_of,
@@ -56,11 +57,17 @@ DOUBT = "Check the data first: "
 
 @dataclass(frozen=True)
 class Sureness:
-    """How sure a verdict is: in a word or two, as a number, and what the number is."""
+    """How sure a verdict is: in a word or two, as a number, what that is; what is left, if it is much."""
 
     words: str
     number: str
     details: tuple[str, ...] = ()
+    left: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """All but the details."""
+        return f"{self.words}: {self.number}.{f' But {self.left}.' if self.left else ''}"
 
 
 def headline(found: Findings) -> str:
@@ -116,7 +123,7 @@ def _without_a_name(found: Findings) -> str:
     if rest is not None:
         where = (
             f"{started(spoken(rest.channel))} of {rest.record} is left with up to "
-            f"{short(rest.times_noise, 2)} times its noise, most of it between {short(rest.start_s)} and "
+            f"{times(rest.times_noise)} its noise, most of it between {short(rest.start_s)} and "
             f"{short(rest.end_s)} s, and follows nothing that these data repeat"
         )
     elif stage is not None and stage.places:
@@ -194,12 +201,12 @@ def sureness(found: Findings) -> Sureness:
         far = farthest(verdict)
         number = f"{far:.2g} standard errors" if far < 100 else "over 100 standard errors"
         said = f"The number that moved farthest lies {number} from the model's."
-        return Sureness(_capped(_word(_FAR, far), found), number, (said, more))
+        return _capped(Sureness(_word(_FAR, far), number, (said, more)), found)
     ratios = [gap.after / gap.noise for gap in verdict.gap.values() if gap.noise > 0]
     worst = max(ratios, default=math.nan)
     words = "No sign of anything missing" if found.search_chance > LEVEL else "Nothing that can be named"
     if math.isfinite(worst):
-        return Sureness(words, f"{worst:.2g} times the noise is left", (more,))
+        return Sureness(words, f"{times(worst)} the noise is left", (more,))
     return Sureness(words, f"{percent(found.search_chance)} by chance", (more,))
 
 
@@ -223,16 +230,16 @@ def much_left(found: Findings) -> str:
     said = []
     if found.times_noise > MUCH_NOISE and found.evidence.rest is not None:
         channel = spoken(found.evidence.rest.channel)
-        said.append(f"{short(found.times_noise, 2)} times the noise of the {channel}")
+        said.append(f"{times(found.times_noise)} the noise of the {channel}")
     if found.unexplained > MUCH_STRUCTURE:
         said.append(f"{percent(found.unexplained)} of the structure")
     return " and ".join(said) + (" is left" if len(said) == 1 else " are left") if said else ""
 
 
-def _capped(words: str, found: Findings) -> str:
-    """The words, with what is left where that is much; then nothing is very sure."""
+def _capped(sure: Sureness, found: Findings) -> Sureness:
+    """With what is left, where that is much; then nothing is very sure."""
     left = much_left(found)
-    return f"{words.replace('Very sure', 'Sure')}, but {left}" if left else words
+    return replace(sure, words=sure.words.replace("Very sure", "Sure"), left=left) if left else sure
 
 
 def _of_effects(found: Findings) -> Sureness:
@@ -244,30 +251,26 @@ def _of_effects(found: Findings) -> Sureness:
         words += (
             " that it is one of these, not which" if len(effects) == 1 else ", up to the alternatives given"
         )
-    sampled = {law.name: law.sampled for law in found.evidence.laws}
-    said = []
-    for effect in effects:
-        parts = [f"{of_ten(effect.confidence)} of such names are right"] if len(effects) > 1 else []
-        if effect.name in sampled:
-            who = "it or one of its group" if effect.indistinguishable_from else "it"
-            parts.append(
-                f"{who} is the best explanation in {percent(sampled[effect.name])} of resampled records"
-            )
-        parts.append(
-            f"where nothing is missing, the whole search finds as much in {below(effect.chance)} of cases"
-        )
-        lead = f"{started(effect.title or spoken(effect.name))}: " if len(effects) > 1 else ""
-        text = "; ".join(parts)
-        said.append(f"{lead}{text if lead else started(text)}.")
+    chance = below(max((effect.chance for effect in effects), default=1.0))
+    by_chance = f"Where nothing is missing, the whole search finds as much in {chance} of cases."
+    said = [by_chance]
+    if len(effects) > 1:
+        said = [
+            f"{started(_title(one))}: {of_ten(one.confidence)} of such names are right." for one in effects
+        ]
+        said.append(by_chance)
     number = f"{of_ten(least)} of such {'verdicts' if len(effects) == 1 else 'names'} are right"
-    return Sureness(_capped(words, found), number, tuple(said))
+    return _capped(Sureness(words, number, tuple(said)), found)
+
+
+def _title(effect: NamedEffect) -> str:
+    return effect.title or spoken(effect.name)
 
 
 def _of_the_unknown(found: Findings) -> Sureness:
     words = "Sure that something is missing, not what"
     rest, stage = found.once, found.strongest
-    near = nearest(found)
-    said = [f"Nearest: {near}."] if near else []
+    said: list[str] = []
     likely = max((one.probability for one in weighings(found.verdict.because)), default=math.nan)
     if math.isfinite(likely):
         said.append(
@@ -276,7 +279,7 @@ def _of_the_unknown(found: Findings) -> Sureness:
         )
     if rest is not None:
         said.insert(0, "Noise alone leaves every stretch of a record at about its own level.")
-        return Sureness(words, f"{short(rest.times_noise, 2)} times the noise", tuple(said))
+        return Sureness(words, f"{times(rest.times_noise)} the noise", tuple(said))
     chance = found.pattern_chance
     if stage is not None:
         said.insert(
@@ -285,7 +288,7 @@ def _of_the_unknown(found: Findings) -> Sureness:
             f"{percent(stage.structured)} of what the model leaves, weighed by the noise, is that pattern.",
         )
     if chance > RULES.chance and found.times_noise > RULES.rest:
-        return Sureness(words, f"{short(found.times_noise, 2)} times the noise is left", tuple(said))
+        return Sureness(words, f"{times(found.times_noise)} the noise is left", tuple(said))
     if chance > RULES.chance:
         words = "Not sure that anything is missing"
     return Sureness(words, f"{below(chance)} by chance", tuple(said))

@@ -46,6 +46,11 @@ def short(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else UNKNOWN
 
 
+def times(value: float) -> str:
+    """How many times something is something else: with a decimal as long as that tells."""
+    return f"{value:.1f} times" if abs(value) < 9.95 else f"{short(value)} times"
+
+
 def percent(share: float) -> str:
     """A share in percent; what resampling cannot tell from all is not called all."""
     if not math.isfinite(share):

@@ -69,9 +69,16 @@ def test_a_name_is_as_sure_as_it_is_likely(probability, words, number):
 def test_nothing_is_very_sure_while_much_is_left(evidence, left):
     found = confident(0.995, **evidence)
     sure = sureness(found)
-    assert sure.words.startswith("Sure, but ")
-    assert left in sure.words
-    assert "very" not in sure.words.lower()
+    assert sure.words == "Sure"
+    assert left in sure.left
+    assert "very" not in sure.sentence.lower()
+
+
+def test_what_is_left_is_on_the_page(tmp_path):
+    assert "<p class='left'>But 16\u00a0% of the structure is left.</p>" in page(
+        confident(0.995, explained=0.84), tmp_path
+    )
+    assert "class='left'" not in page(confident(0.995), tmp_path)
 
 
 def test_little_that_is_left_is_not_much():
@@ -84,14 +91,23 @@ def test_numbers_that_are_far_off_are_not_very_sure_while_much_is_left():
     fields = {"parameters": {FRICTION: number}, "moved": [FRICTION]}
     assert sureness(told(PARAMETER, **fields)).words == "Very sure"
     left = told(PARAMETER.model_copy(update={"rest": rest(3.0)}), **{"verdict": "parameter"} | fields)
-    assert sureness(left).words == "Sure, but 3 times the noise of the motor torque is left"
+    assert sureness(left).sentence.startswith("Sure: ")
+    assert sureness(left).sentence.endswith("But 3.0 times the noise of the motor torque is left.")
 
 
 def test_a_group_is_sure_as_a_group():
     found = told(EFFECT.model_copy(update={"laws": [law(group=["unbalance"])]}))
     assert "(these data cannot tell which)" in headline(found)
     assert "that it is one of these, not which" in sureness(found).words
-    assert "it or one of its group is the best" in sureness(found).details[0].lower()
+
+
+def test_each_of_several_names_has_its_own_probability():
+    found = told(EFFECT.model_copy(update={"laws": [law(), law("unbalance", sampled=0.1, beyond=0.05)]}))
+    first, second, chance = sureness(found).details
+    assert first == "Motor torque ripple: over 99 in 100 of such names are right."
+    assert second.startswith("Unbalance: ")
+    assert "less than 0.25\u00a0% of cases" in chance
+    assert sureness(found).number.endswith("of such names are right")
 
 
 def test_what_a_name_leaves_is_said_with_its_place():
@@ -106,7 +122,7 @@ def test_a_curve_beside_a_name_is_what_the_name_leaves(tmp_path):
     found = told(EFFECT.model_copy(update=changed), curve=CURVE, scenario="out/found.yaml")
     text = page(found, tmp_path)
     assert "What the named effects leave" in text
-    assert "9\u00a0% of it follows another shape" in text
+    assert "9\u00a0% of it (of the structure that the re-fitted model left) follows another shape" in text
     assert "The curve that is missing" not in text
     assert "the model with what was found" in text
     assert "with the curve" not in text
