@@ -20,13 +20,14 @@ from hdsim.diagnose.verdict import Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.check import Check, check_record
+from hdsim.estimate.check import Check
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.estimate.numbers import Interval
-from hdsim.estimate.predict import LoadSource, Locked, PredictionError, predictors
+from hdsim.estimate.opening import bench_for, checked
+from hdsim.estimate.predict import LoadSource, PredictionError
 from hdsim.estimate.prove import borne_out, gaps
-from hdsim.estimate.records import Array, Record, record_from
+from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit, tie
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, suspicions
@@ -109,29 +110,11 @@ def _diagnosed(
         yield
         seconds[name] = round(seconds.get(name, 0.0) + time.perf_counter() - started, 3)
 
-    ratio = scenario.drive.ratio
     with step("check", "checking the data"):
-        records, held = (
-            [r if isinstance(r, Record) else record_from(r) for r in many] for many in (measured, holdout)
-        )
-        if not records:
-            raise InputError("no measured record is given")
-        checks = [check_record(record, ratio) for record in [*records, *held]]
+        records, held, checks = checked(measured, scenario, holdout=holdout, force=force)
         problems = [problem for check in checks for problem in check.problems]
-        errors = [problem for check in checks for problem in check.errors]
-        if errors and not force:
-            lines = "\n".join(f"{p.record}: {p.channel}: {p.kind}: {p.message}" for p in errors)
-            raise InputError(f"{lines}\nmend the mapping or the data, or go on in spite of it (--force)")
     with step("compare", "predicting the measured channels"):
-        locked: Locked = (
-            "output"
-            if scenario.command.output.type == "locked"
-            else "motor"
-            if scenario.command.motor.type == "locked"
-            else ""
-        )
-        training = predictors(records, ratio, load=load, locked=locked)
-        bench = Bench(training, predictors(held, ratio, load=load, locked=locked))
+        bench = bench_for(records, held, scenario, load)
     start = state_of(scenario)
     with step("refit", "re-fitting the model's own numbers"):
         try:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import Check, check_record
-from hdsim.estimate.predict import LoadSource, predictors
+from hdsim.estimate.predict import LoadSource, Locked, predictors
 from hdsim.estimate.records import Record, record_from
 
 if TYPE_CHECKING:
@@ -55,6 +55,8 @@ def bench_for(
     Raises:
         InputError: nothing can be predicted.
     """
-    ratio, locked = scenario.drive.ratio, scenario.command.output.type == "locked"
-    training = predictors(records, ratio, load=load, output_locked=locked)
-    return Bench(training, predictors(held, ratio, load=load, output_locked=locked))
+    ratio, command = scenario.drive.ratio, scenario.command
+    locked: Locked = "motor" if command.motor.type == "locked" else ""
+    locked = "output" if command.output.type == "locked" else locked
+    training = predictors(records, ratio, load=load, locked=locked)
+    return Bench(training, predictors(held, ratio, load=load, locked=locked))

@@ -89,7 +89,7 @@ def _show(result: FitResult) -> None:
 
     from hdsim.console import console
     from hdsim.tell.fit_report import GAP_HEAD, gap_rows, summary
-    from hdsim.tell.wording import named_number, shown
+    from hdsim.tell.words import named_number, shown
 
     out = console()
     out.print(Text(summary(result)), highlight=False)

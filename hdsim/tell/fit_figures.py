@@ -9,7 +9,7 @@ import numpy as np
 from hdsim.estimate.estimation import Estimation
 from hdsim.plot import style, units
 from hdsim.tell.figures import AFTER, BEFORE, POINTS, WIDTH
-from hdsim.tell.wording import named_number, spoken
+from hdsim.tell.words import named_number, spoken
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

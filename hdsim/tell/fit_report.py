@@ -17,7 +17,7 @@ from hdsim.plot import units
 from hdsim.tell import fit_figures
 from hdsim.tell.staging import staged
 from hdsim.tell.tables import numbers_table, table
-from hdsim.tell.wording import named_number, shown, spoken, unit_of
+from hdsim.tell.words import named_number, shown, spoken, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

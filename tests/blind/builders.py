@@ -117,7 +117,7 @@ def load_friction(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
 
 def hysteresis(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
     return {"maxwell": 0.05 * d.torques[0] * x, "maxwell_reach": between(0.6, 1.5, r[0]) * twist(d),
-            "maxwell_form": float(same), "maxwell_power": 12.0 * same}  # fmt: skip
+            "maxwell_form": float(same), "maxwell_power": 0.0}  # fmt: skip
 
 
 def bouc_wen(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:

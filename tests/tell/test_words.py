@@ -1,10 +1,10 @@
 """Numbers, names and units as they are written."""
 
 import pytest
+from hdsim.estimate.freedom import base_freedoms, state_of
 
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Harmonic, Inverse
-from hdsim.estimate.freedom import base_freedoms, state_of
 from hdsim.scenario.fields import UNITS
 from hdsim.tell.words import named_number, of_ten, shown
 
