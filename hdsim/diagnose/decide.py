@@ -43,6 +43,8 @@ class Decision(Part):
     """Which of the evidence's effects are believed."""
     confidence: list[float] = []
     """Probability that each of the evidence's effects is right, itself or its group."""
+    certainty: float
+    """Probability that the verdict is right: its first name's, or that of there being none to give."""
     because: list[Reason] = []
     """Every rule that was asked, with what was seen."""
 
@@ -63,7 +65,13 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
             Reason(rule="likely enough for a name", of=name, seen=p, limit=rules.believed, holds=k in names)
         )
     if names:
-        return Decision(kind="effect", names=names, confidence=confidence, because=because)
+        return Decision(
+            kind="effect",
+            names=names,
+            confidence=confidence,
+            certainty=confidence[names[0]],
+            because=because,
+        )
     found = bool(evidence.laws)
     structured = evidence.left_chance <= rules.chance and evidence.left >= rules.structured
     left = evidence.rest.times_noise if evidence.rest is not None else 0.0
@@ -74,13 +82,14 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
     ):
         because.append(Reason(rule=rule, seen=seen, limit=limit, holds=holds))
     if found or structured or left > rules.rest:
-        return Decision(kind="unknown", confidence=confidence, because=because)
+        certainty = (1.0 - max(confidence, default=0.0)) * rules.unknown
+        return Decision(kind="unknown", confidence=confidence, certainty=certainty, because=because)
     fell = evidence.fell >= rules.fall
     because.append(
         Reason(rule="the re-fit closes a held-out gap", seen=evidence.fell, limit=rules.fall, holds=fell)
     )
     kind: Kind = "parameter" if fell else "nothing"
-    return Decision(kind=kind, confidence=confidence, because=because)
+    return Decision(kind=kind, confidence=confidence, certainty=rules.nothing, because=because)
 
 
 def probability(evidence: Evidence, k: int, rules: Rules, because: list[Reason]) -> float:

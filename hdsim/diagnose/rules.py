@@ -51,6 +51,10 @@ class Rules(Part):
         "blind seeds 100-502 of the first matrix",
     )
     rest: float = _rule(1.6, "times the noise", "what may be left without being called unknown", "chosen")
+    unknown: float = _rule(
+        0.85, "probability", "that what no effect explains is in none of the catalogue's laws", "chosen"
+    )
+    nothing: float = _rule(0.9, "probability", "that a silent diagnosis has missed nothing", "chosen")
     fall: float = _rule(0.03, "1", "least relative fall of a held-out gap for a number to be off", "chosen")
 
 

@@ -74,6 +74,8 @@ class Verdict(Part):
     """``unknown``: something is there, and no name for it is likely enough to be given."""
     sentence: str
     """The verdict in words."""
+    confidence: float = Field(1.0, ge=0, le=1)
+    """Probability that it is right: of the first name, or of there being none to give; calibrated."""
     effects: list[NamedEffect] = []
     """Named effects in the order in which they were found."""
     suspects: dict[str, float] = {}

@@ -174,6 +174,7 @@ def _diagnosed(
         "located": _located(found.stages),
         "data_problems": [DataProblem(**vars(problem)) for problem in problems],
         "not_tried": found.stages[0].screening.skipped if found.stages[0].screening else {},
+        "confidence": decision.certainty,
         "because": decision.because,
         "curve": curve.found() if curve is not None else None,
         "seconds": seconds,
