@@ -28,6 +28,9 @@ SHORTLIST, NEAR = 9, 0.25
 #: The same part for effects that are known to look like the best, or that live in the coordinate that
 #: explains most: the screen is linear, they are not.
 ALIKE = 0.1
+#: What the screen says that a candidate leaves, in units of what it says of the best, for its fit to be worth
+#: its time: of effects that are linear in their numbers, and of those that have shapes.
+LINEAR, FREER = 4.0, 8.0
 #: Logarithm by which a re-fit must have made the drive softer for a compliance to be suspected.
 SOFTER = 0.03
 #: Part of its share that another effect must keep beside the best to be an effect of its own.
@@ -104,7 +107,7 @@ def name_effect(
         return ALIKE if lives or confusable(best.name, name) else NEAR
 
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
-    shortlist = shortlist[:SHORTLIST]
+    shortlist = [one for one in shortlist if _could_win(one, best)][:SHORTLIST]
     softer = any(free.compliance and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True))
     if softer and any(one.added.fitting.in_series for one in shortlist):
         # The re-fit may have taken any compliance in series for the drive's own.
@@ -160,6 +163,19 @@ def name_effect(
         },
         [_as_evidence(result, results[0], before, whole, on_screen[result[0]]) for result in results],
     )
+
+
+def _could_win(one: Screened, best: Screened) -> bool:
+    """Whether a candidate's fit may still catch up with what the screen's best one leaves.
+
+    An effect that is linear in its numbers fits hardly better than its trace; one with shapes, a play or a
+    compliance in series may.
+    """
+    fitting = one.added.fitting
+    if fitting.in_series or fitting.play:
+        return True
+    room = FREER if fitting.shapes else LINEAR
+    return 1.0 - one.share.share <= room * (1.0 - best.share.share)
 
 
 def _as_evidence(

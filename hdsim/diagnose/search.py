@@ -22,7 +22,7 @@ from hdsim.diagnose.name import (
     name_effect,
 )
 from hdsim.diagnose.screen import Residual
-from hdsim.diagnose.traces import Screening, screen
+from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, at_present, fit
@@ -39,6 +39,9 @@ MOST_EFFECTS, MOST_STAGES = 4, 7
 BEYOND_GAIN, WITHIN_GAIN = 0.005, 0.1
 #: Part of what is left by which it must have fallen for the last name to be asked again.
 NEWS = 0.1
+
+#: Share of resampled records that a name must have won not to be asked again because of a far smaller one.
+CLEAR = 0.995
 
 Step = Callable[[str], object]
 
@@ -139,8 +142,11 @@ def _one_more(
     """
     left = beyond_curves(bench, current, found.left, found.named) if beyond else found.left
     places = stage.location.places
-    tell = during("screen", "screening the catalogue")
-    screening = screen(bench, current.state, left, stage.location.lines, places=places, on_step=tell)
+    if stage.screening is None:
+        tell = during("screen", "screening the catalogue")
+        screening = screen(bench, current.state, left, stage.location.lines, places=places, on_step=tell)
+    else:
+        screening = ranked_anew(stage.screening, left)
     if stage.screening is None or screening.chance < stage.screening.chance:
         stage.screening = screening
     if not screening.ranked or screening.chance > LEVEL:
@@ -199,6 +205,9 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
     k = 0
     while k < len(found.named):
         stuck = current.state.added[k].at_limit
+        if not stuck and _clear(found.named[k], found.named[-1]):
+            k += 1
+            continue
         settled = bench.power(current.predictions) > (1.0 - NEWS) * first
         if k == len(found.named) - 1 and settled and not stuck:
             break
@@ -242,6 +251,11 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             found.named[k] = own
         k += 1
     return current
+
+
+def _clear(one: Named, newest: Named) -> bool:
+    """Whether a name won so clearly that what came since can't have changed it."""
+    return one is not newest and one.confidence >= CLEAR and not one.group and newest.gain < NEWS * one.gain
 
 
 def left_of(bench: Bench, current: Fit) -> Residual:

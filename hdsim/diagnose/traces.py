@@ -160,6 +160,26 @@ def screen(
     return found
 
 
+def ranked_anew(screening: Screening, residual: Residual) -> Screening:
+    """A screening's traces on another residual of the same model."""
+    found = Screening(skipped=screening.skipped)
+    shares: list[Share] = []
+    for one in screening.ranked:
+        kinds = []
+        for each in (one, *one.others):
+            share = _allowed(residual, each.columns, each.added.fitting.signed(each.added.orders))
+            shares.append(share)
+            added = replace(each.added, coefficients=tuple(share.coefficients))
+            kinds.append(Screened(each.name, added, share, each.columns))
+        kinds.sort(key=lambda kind: -kind.share.share)
+        kinds[0].others = kinds[1:]
+        found.ranked.append(kinds[0])
+    found.ranked.sort(key=lambda one: -one.share.share)
+    if found.ranked:
+        found.chance = chance_of(found.ranked[0].share, shares)
+    return found
+
+
 def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[str, float]) -> list[Added]:
     """The effect at unit size with every combination of its shapes' starts.
 
