@@ -46,7 +46,7 @@ def states(line: Line) -> bool:
 
 def band(line: Line) -> str:
     """Band of the strength of what is hidden least visibly."""
-    if not line["strength"]:
+    if not line["strength"] or line["kind"] in ("null", "parameter"):
         return "-"
     weakest = min(line["strength"])
     for low, high in BANDS:

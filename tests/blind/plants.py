@@ -76,6 +76,15 @@ def load_at(o, p):
 
 
 @njit(cache=True)
+def known_load(t, p):
+    """Torque that a bench puts on the output; it comes on within half a second, and the drive was at rest."""
+    s = min(1.0, t / 0.5)
+    torque = p.known_a * math.sin(2 * math.pi * p.known_a_hz * t)
+    torque += p.known_b * math.sin(2 * math.pi * p.known_b_hz * t + p.known_phase)
+    return s * s * (3.0 - 2.0 * s) * torque
+
+
+@njit(cache=True)
 def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     """The state: motor angle, speed; output; housing; mounted mass (each so); Duhem torque; temperature.
 
@@ -135,8 +144,7 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     drive -= p.motor_weight * math.cos(m + p.motor_weight_phase)
     drive += p.drift * math.sin(2 * math.pi * t / 5.3) * math.exp(-t / 9.0)
     load = load_at(o, p)
-    load -= p.known_a * math.sin(2 * math.pi * p.known_a_hz * t)
-    load -= p.known_b * math.sin(2 * math.pi * p.known_b_hz * t + p.known_phase)
+    load -= known_load(t, p)
     load += p.load_coulomb * sign_of(wo, p.load_sign_speed, 1.0 - p.load_form) + p.load_viscous * wo
     dy[6], dy[7] = y[7], 0.0
     if p.absorber > 0:
@@ -237,7 +245,7 @@ def balance(p: Numbers, angle: float, table: np.ndarray, reach: float) -> np.nda
         return np.zeros(3)
     motor, output, housing = p.ratio * angle, angle, 0.0
     for _ in range(30):
-        load = load_at(output, p) - p.known_b * math.sin(p.known_phase)
+        load = load_at(output, p)
         low, high = -reach, reach
         for _ in range(60):
             middle = 0.5 * (low + high)

@@ -68,6 +68,6 @@ def picture(lines: Sequence[Line], path: Path) -> None:
     lower.bar(
         [low for low, *_ in bins], [b[4] for b in bins], widths, align="edge", color="C0", edgecolor="w"
     )
-    lower.set(xlabel="stated confidence", ylabel="cases", xlim=(0, 1))
+    lower.set(xlabel="stated confidence", ylabel="cases", xlim=(-0.03, 1.03))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
