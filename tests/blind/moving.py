@@ -50,10 +50,11 @@ def motion(
     if kind not in ("plateaus", "creep"):
         speed = speed / max(peak, 1e-9) * rng.uniform(0.6, 1.0)
     speed = top * speed * np.clip(t / max(3 * smooth_s, 0.2), 0.0, 1.0)
+    # Late by what the moving means reach back, so that it starts from rest.
+    width = max(round(smooth_s * tick_hz), 1)
+    speed = np.concatenate([np.zeros(2 * width), speed])[: len(t)]
     for _ in range(3):
-        width = max(round(smooth_s * tick_hz), 1)
         padded = np.concatenate([np.zeros(width), speed, np.full(width, speed[-1])])
         speed = np.convolve(padded, np.ones(width) / width, mode="same")[width:-width]
-    speed[0] = 0.0
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / tick_hz
     return angle, speed
