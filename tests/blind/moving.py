@@ -43,6 +43,7 @@ def motion(
     elif kind == "plateaus":
         levels = np.repeat(rng.permutation([0.05, 0.2, 0.5, 0.75, 1.0]), 2) * np.tile([1.0, -1.0], 5)
         speed = levels[np.minimum((t * 10 / max(seconds, 1e-9)).astype(int), 9)]
+        smooth_s = 2.5 * smooth_s  # between two speeds there is much to turn round
     else:
         turns = np.sin(2 * np.pi * t / rng.uniform(2.0, 5.0) + rng.uniform(0, 6.3))
         speed = rng.uniform(0.06, 0.25) * np.sign(turns) * rng.uniform(0.7, 1.0)
