@@ -230,8 +230,8 @@ def draw_sensing(
     noise = {
         "motor_angle": log_uniform(rng, 5e-6, 6e-5),
         "output_angle": log_uniform(rng, quietest_rad, 1.2e-5),
-        # In a slow log of a reversal nobody can tell the friction's jump to less.
-        "motor_torque": drive.coulomb * log_uniform(rng, max(0.06, 14.0 / rate), 0.3),
+        # Friction jumps by 2 T_c in a sample or two at a reversal, and no smoothed motion tells exactly when.
+        "motor_torque": drive.coulomb * log_uniform(rng, max(0.12, 16.0 / rate), 0.4),
         "output_torque": drive.torques[0] * log_uniform(rng, 0.006, 0.03),
         "temperature": 0.05,
     }

@@ -1,10 +1,10 @@
 """Blind plants in MuJoCo: ``draw(number, seed)`` hides an effect in a drive and measures it.
 
-Strength: the trace of what is hidden along one motor motion, that of the plant without it under its controller.
-With and without the effect the output (and the torque that the motion takes) is simulated again with the motor's
-motion prescribed; the difference over the noise, after least squares on offsets and on the plant's sensitivities
-to the base's own numbers, is what counts. Of several records the first counts, 12 s of it at most. What is only a
-number of the base counts as it is.
+Strength: the trace of what is hidden along one motor motion, that of the plant without it under its
+controller. With and without the effect the output (and the torque that the motion takes) is simulated again
+with the motor's motion prescribed; the difference over the noise, after least squares on offsets and on the
+plant's sensitivities to the base's own numbers, is what counts. Of several records the first counts, 12 s
+of it at most. What is only a number of the base counts as it is.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from drawing import (
     visible,
 )
 from moving import MOTIONS, motion
-from mujoco_effects import EFFECTS, OUTSIDE, PAIRS, Changes, Hidden
+from mujoco_effects import EFFECTS, PAIRS, Changes, Hidden
+from mujoco_outside import OUTSIDE
 from mujoco_plant import STEP_HZ, Motion, Numbers, acceleration, simulate
 
 FAMILY = "mujoco"
@@ -138,30 +139,30 @@ class Visibility:
 
     def _sensitivities(self) -> list[np.ndarray]:
         x, p, like = self.x, self.base, self.like
-        columns = []
-        for name in () if p.rigid else ("load_inertia", "damping", "arm"):
-            if value := getattr(p, name):
-                columns.append(self._weighed({name: value * (1 + CHANGE)}) - self.plain)
+        varied = [
+            {name: value * (1 + CHANGE)}
+            for name in ("load_inertia", "damping", "arm")
+            if (value := getattr(p, name)) and not p.rigid
+        ]
         if not p.rigid:
-            columns.append(
-                self._weighed({k: getattr(p, k) * (1 + CHANGE) for k in ("k1", "k2", "k3")}) - self.plain
-            )
-        # What only the motor's torque shows is known without another simulation.
+            varied.append({k: getattr(p, k) * (1 + CHANGE) for k in ("k1", "k2", "k3")})
+        columns = [self._weighed(changes) - self.plain for changes in varied]
+        # What the rest does along a prescribed motion is known without a simulation.
         speed, joint = like[:, 1], like[:, 4]
-        sign = np.tanh(speed / 0.5)
-        accelerated = acceleration(like, 1.0 / x.rows_hz)
-        for torque in (accelerated, sign, speed, np.abs(joint) * sign, like[:, 5], joint, np.sin(like[:, 2])):
-            rows = [
-                self._cut(torque) if c == "motor_torque" else 0.0 * self._cut(torque)
-                for c in x.sensing.compared
-            ]
-            columns.append(np.array(rows))
+        sign, accelerated = np.tanh(speed / 0.5), acceleration(like, 1.0 / x.rows_hz)
+        columns += [
+            self._column(motor_torque=torque)
+            for torque in (accelerated, sign, speed, np.abs(joint) * sign, like[:, 5])
+        ]
         if p.rigid:
-            joints = (accelerated, np.sin(like[:, 2])) if p.arm else (accelerated,)
-            for torque in joints:
-                rows = [self._cut(torque) * (c == "output_torque") for c in x.sensing.compared]
-                columns.append(np.array(rows))
+            loads = (accelerated / p.ratio, *((np.sin(like[:, 2]),) if p.arm else ()))
+            columns += [self._column(motor_torque=load / p.ratio, output_torque=load) for load in loads]
         return columns
+
+    def _column(self, **found: np.ndarray) -> np.ndarray:
+        """Channels over their noise, shape (channels, n): those that are not given are zero."""
+        sensing, none = self.x.sensing, np.zeros(len(self.like))
+        return np.array([self._cut(found.get(c, none)) / sensing.sigma(c) for c in sensing.compared])
 
     def of(self, changes: Changes) -> tuple[float, float]:
         """Plain strength, and beyond what the base's own numbers explain."""

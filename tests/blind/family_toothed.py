@@ -1,13 +1,14 @@
 """Blind plants that are hdsim's own toothed drive, held against a lumped base.
 
-The lumped base has the catalogue's secant stiffnesses, which the toothed drive has too, its teeth, gap and structure
-together. Hidden is the gap of the rough flanks (the Weierstrass-Mandelbrot half-gaps of every tooth, 0.5 to 3 times
-the nominal ones, other flanks for every seed), an effect of the catalogue in a drive whose teeth have no gap, or
-both. Without a gap and with linear contact the teeth are the null: their parting and meeting remains, far below the
-noise.
+The lumped base has the catalogue's secant stiffnesses, which the toothed drive has too, its teeth, gap and
+structure together. Hidden is the gap of the rough flanks (the Weierstrass-Mandelbrot half-gaps of every
+tooth, 0.5 to 3 times the nominal ones, other flanks for every seed), an effect of the catalogue in a drive
+whose teeth have no gap, or both. Without a gap and with linear contact the teeth are the null: their
+parting and meeting remains, far below the noise.
 
-Strength: hdsim's toothed drive with and without what is hidden, both along the motor motion of the plant without it
-under its controller; least squares take out offsets and the sensitivities of the lumped base's own numbers.
+Strength: hdsim's toothed drive with and without what is hidden, both along the motor motion of the plant
+without it under its controller; least squares take out offsets and the sensitivities of the lumped base's
+own numbers.
 """
 
 from __future__ import annotations
@@ -65,20 +66,46 @@ class Hidden:
         if self.name == "kinematic_error":
             sizes = (1.0, 0.3 + 0.5 * r[0], 0.3)
             kinds = ("wave_generator_turn", "relative_turn", "wave_generator_turn")
-            return {"components": [
-                {"order": order, "amplitude_arcmin": minute * size, "per": per, "phase_deg": 360.0 * phase}
-                for order, size, per, phase in zip((2, 2, 4), sizes, kinds, r[1:4], strict=True)]}  # fmt: skip
+            return {
+                "components": [
+                    {
+                        "order": order,
+                        "amplitude_arcmin": minute * size,
+                        "per": per,
+                        "phase_deg": 360.0 * phase,
+                    }
+                    for order, size, per, phase in zip((2, 2, 4), sizes, kinds, r[1:4], strict=True)
+                ]
+            }
         return {
             "torsional_hysteresis_maxwell": {"slip_torque_nm": 0.1 * d.torques[0] * x},
-            "torsional_hysteresis_duhem": {"saturation_torque_nm": 0.1 * d.torques[0] * x,
-                                           "saturation_twist_mrad": 1e3 * twist * (0.15 + 0.4 * r[0])},
-            "motor_torque_ripple": {"components": [
-                {"order": (6.0, 12.0)[int(2 * r[0])], "cogging_nm": 0.15 * d.coulomb * x, "phase_deg": 360.0 * r[1]}]},
-            "stribeck_friction": {"extra_static_nm": 0.3 * d.coulomb * x, "stribeck_velocity_rad_per_s": 3 + 6 * r[0]},
-            "load_side_friction": {"coulomb_nm": 0.1 * d.torques[0] * x,
-                                   "viscous_nm_s_per_rad": 0.05 * d.torques[0] * x * abs(d.ratio) / d.top_speed},
-            "damaged_tooth": {"amplitude_arcmin": -2 * minute, "position_deg": 180.0 * r[0], "width_deg": 6 + 8 * r[1]},
-        }[self.name]  # fmt: skip
+            "torsional_hysteresis_duhem": {
+                "saturation_torque_nm": 0.1 * d.torques[0] * x,
+                "saturation_twist_mrad": 1e3 * twist * (0.15 + 0.4 * r[0]),
+            },
+            "motor_torque_ripple": {
+                "components": [
+                    {
+                        "order": (6.0, 12.0)[int(2 * r[0])],
+                        "cogging_nm": 0.15 * d.coulomb * x,
+                        "phase_deg": 360.0 * r[1],
+                    }
+                ]
+            },
+            "stribeck_friction": {
+                "extra_static_nm": 0.3 * d.coulomb * x,
+                "stribeck_velocity_rad_per_s": 3 + 6 * r[0],
+            },
+            "load_side_friction": {
+                "coulomb_nm": 0.1 * d.torques[0] * x,
+                "viscous_nm_s_per_rad": 0.05 * d.torques[0] * x * abs(d.ratio) / d.top_speed,
+            },
+            "damaged_tooth": {
+                "amplitude_arcmin": -2 * minute,
+                "position_deg": 180.0 * r[0],
+                "width_deg": 6 + 8 * r[1],
+            },
+        }[self.name]
 
 
 EFFECTS = (
@@ -136,7 +163,7 @@ class Visibility:
         return visible(self.weighed(self.base, teeth, effects) - self.plain, self.columns)[1]
 
     def sized(self, h: Hidden, uniform: list[float], wanted: float) -> tuple[dict[str, Any], float]:
-        """Settings of an effect with the wanted strength, by a secant iteration; the nearest that is physical."""
+        """Settings with the wanted strength, by a secant iteration; the nearest that is physical."""
         size, best = 1.0, (math.inf, {}, 0.0)
         last: tuple[float, float] | None = None
         for _ in range(STEPS):
@@ -190,7 +217,9 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
         names = tuple(str(n) for n in rng.choice(list(PARAMETERS), int(rng.integers(1, 3)), replace=False))
     arm = bool({"mass", "load-dependent loss"} & set(names) or (h and h.loaded) or rng.random() < 0.6)
     d = draw_drive(rng, arm=arm)
-    sensing = draw_sensing(rng, d, kinds, fast=bool(h and h.name == "motor_torque_ripple"), quietest_rad=3e-6)
+    sensing = draw_sensing(
+        rng, d, kinds, fast=bool(h and h.name == "motor_torque_ripple"), quietest_rad=5e-7 if gapped else 3e-6
+    )
     d = slower(d, sensing.rate)
     given, held, how = draw_lengths(rng, sensing.rate)
     allowed = MOTIONS if sensing.rate >= 200 else tuple(k for k in MOTIONS if k != "plateaus")

@@ -43,6 +43,7 @@ def motion(
     elif kind == "plateaus":
         levels = np.repeat(rng.permutation([0.05, 0.2, 0.5, 0.75, 1.0]), 2) * np.tile([1.0, -1.0], 5)
         speed = levels[np.minimum((t * 10 / max(seconds, 1e-9)).astype(int), 9)]
+        smooth_s = 2.5 * smooth_s  # between two speeds there is much to turn round
     else:
         turns = np.sin(2 * np.pi * t / rng.uniform(2.0, 5.0) + rng.uniform(0, 6.3))
         speed = rng.uniform(0.06, 0.25) * np.sign(turns) * rng.uniform(0.7, 1.0)
@@ -50,10 +51,11 @@ def motion(
     if kind not in ("plateaus", "creep"):
         speed = speed / max(peak, 1e-9) * rng.uniform(0.6, 1.0)
     speed = top * speed * np.clip(t / max(3 * smooth_s, 0.2), 0.0, 1.0)
+    # Late by what the moving means reach back, so that it starts from rest.
+    width = max(round(smooth_s * tick_hz), 1)
+    speed = np.concatenate([np.zeros(2 * width), speed])[: len(t)]
     for _ in range(3):
-        width = max(round(smooth_s * tick_hz), 1)
         padded = np.concatenate([np.zeros(width), speed, np.full(width, speed[-1])])
         speed = np.convolve(padded, np.ones(width) / width, mode="same")[width:-width]
-    speed[0] = 0.0
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / tick_hz
     return angle, speed

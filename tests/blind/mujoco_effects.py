@@ -25,8 +25,8 @@ class Hidden:
 
     Attributes:
         name: what it is called here; the catalogue's name where it has one.
-        build: the plant's changes from drive, uniform draws, size (1: plain to see with usual sensors), and whether
-            the formula is the catalogue's.
+        build: the plant's changes from drive, uniform draws, size (1: plain to see with usual sensors), and
+            whether the formula is the catalogue's.
         most: largest size that is physical.
         accepted: names of the catalogue that are right.
         channels: channels that it needs.
@@ -59,8 +59,14 @@ def _twist(d: Drive) -> float:
 
 def kinematic(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     a = 3e-5 * x
-    found = {"ke_2": a, "ke_2_phase": TURN * r[0], "ke_rel": (0.3 + 0.6 * r[1]) * a, "ke_rel_phase": TURN * r[2],
-             "ke_4": 0.3 * a, "ke_4_phase": TURN * r[3]}  # fmt: skip
+    found = {
+        "ke_2": a,
+        "ke_2_phase": TURN * r[0],
+        "ke_rel": (0.3 + 0.6 * r[1]) * a,
+        "ke_rel_phase": TURN * r[2],
+        "ke_4": 0.3 * a,
+        "ke_4_phase": TURN * r[3],
+    }
     return found if same else found | {"ke_1": 0.35 * a, "ke_1_phase": TURN * r[4]}
 
 
@@ -147,49 +153,166 @@ ECCENTRIC = ("output_eccentricity", "sensors")
 
 EFFECTS = (
     Hidden("kinematic_error", kinematic, channels=OUTPUT, most=40, numbers=kinematic_numbers),
-    Hidden("stribeck_friction", stribeck, most=6, rigid=True, numbers=lambda d, c: {
-        "extra_static_nm": c["stribeck"], "stribeck_velocity_rad_per_s": c["stribeck_speed"]}),
-    Hidden("output_backlash", lambda d, r, x, same: {"gap": 4e-5 * x}, channels=OUTPUT, most=40,
-           numbers=lambda d, c: {"backlash_arcmin": c["gap"] / ARCMIN}),
-    Hidden("motor_torque_ripple", ripple, rigid=True, most=40, fast=True, numbers=lambda d, c: {
-        "components.0.order": c["cogging_order"], "components.0.cogging_nm": c["cogging"]}),
-    Hidden("torsional_hysteresis_duhem", hysteresis(0.0), channels=OUTPUT, accepted=HYSTERESIS, loaded=True, most=10,
-           motions=SWINGS, numbers=lambda d, c: {
-               "saturation_torque_nm": c["slip"], "saturation_twist_mrad": 1e3 * c["slip_twist"]}),
-    Hidden("input_coulomb_viscous", friction, lacks=("coulomb", "viscous"), rigid=True, most=3, numbers=lambda d, c: {
-        "coulomb_nm": c["extra_coulomb"], "viscous_nm_s_per_rad": c["extra_viscous"]}),
-    Hidden("output encoder eccentricity", lambda d, r, x, same: {"encoder_once": 4e-5 * x, "encoder_phase": TURN * r[0]},
-           channels=OUTPUT, accepted=ECCENTRIC, rigid=True, numbers=lambda d, c: {
-               "output_angle.eccentricity_arcmin": c["encoder_once"] / ARCMIN}),
-    Hidden("load_side_friction", output_friction, rigid=True, most=10, numbers=lambda d, c: {
-        "coulomb_nm": c["output_coulomb"], "viscous_nm_s_per_rad": c["output_viscous"]}),
-    Hidden("unbalance", lambda d, r, x, same: {
-        "unbalance": 0.1 * d.torques[0] / GRAVITY * x, "unbalance_phase": TURN * r[0]}, rigid=True, most=10,
-        numbers=lambda d, c: {"output_kg_m": c["unbalance"]}),
-    Hidden("lugre_friction", bristles, rigid=True, most=4, motions=("multisine", "moves", "creep"),
-           numbers=lambda d, c: {"coulomb_nm": c["bristle_coulomb"], "static_nm": c["bristle_static"]}),
-    Hidden("torque-sensor ripple", sensor_ripple, channels=("output_torque",), accepted=("sensors",), rigid=True,
-           numbers=lambda d, c: {"output_torque.ripple.0.amplitude_nm": c["sensor_ripple"]}),
-    Hidden("stiffness_nonlinearity", lambda d, r, x, same: {"cubic": 0.05 * d.stiffness[0] / _twist(d) ** 2 * x},
-           channels=OUTPUT, loaded=True, most=30, motions=SWINGS,
-           numbers=lambda d, c: {"cubic_nm_per_rad3": c["cubic"]}),
-    Hidden("load_dependent_loss", loss, lacks=("load_loss",), loaded=True, rigid=True, most=6,
-           numbers=lambda d, c: {"coefficient": c["driving_loss"]}),
-    Hidden("torsional_hysteresis_maxwell", hysteresis(0.9), channels=OUTPUT, accepted=HYSTERESIS, loaded=True, most=10,
-           motions=SWINGS),
-    Hidden("thermal_friction", thermal, rigid=True, most=5, seconds=15.0, motions=("multisine", "moves", "plateaus"),
-           numbers=lambda d, c: {"viscosity_coefficient_per_k": c["thermal"]}),
-    Hidden("wave_generator_eccentricity", lambda d, r, x, same: {"ke_1": 3e-5 * x, "ke_1_phase": TURN * r[0]} | (
-        {} if same else {"ke_2": 0.3e-5 * x}), channels=OUTPUT, most=40),
-    Hidden("unbalance of the rotor", lambda d, r, x, same: {
-        "rotor_unbalance": 0.2 * d.coulomb / GRAVITY * x, "rotor_unbalance_phase": TURN * r[0]},
-        accepted=("unbalance",), rigid=True, most=4, numbers=lambda d, c: {"motor_kg_m": c["rotor_unbalance"]}),
+    Hidden(
+        "stribeck_friction",
+        stribeck,
+        most=6,
+        rigid=True,
+        numbers=lambda d, c: {
+            "extra_static_nm": c["stribeck"],
+            "stribeck_velocity_rad_per_s": c["stribeck_speed"],
+        },
+    ),
+    Hidden(
+        "output_backlash",
+        lambda d, r, x, same: {"gap": 4e-5 * x},
+        channels=OUTPUT,
+        most=40,
+        numbers=lambda d, c: {"backlash_arcmin": c["gap"] / ARCMIN},
+    ),
+    Hidden(
+        "motor_torque_ripple",
+        ripple,
+        rigid=True,
+        most=40,
+        fast=True,
+        numbers=lambda d, c: {
+            "components.0.order": c["cogging_order"],
+            "components.0.cogging_nm": c["cogging"],
+        },
+    ),
+    Hidden(
+        "torsional_hysteresis_duhem",
+        hysteresis(0.0),
+        channels=OUTPUT,
+        accepted=HYSTERESIS,
+        loaded=True,
+        most=10,
+        motions=SWINGS,
+        numbers=lambda d, c: {
+            "saturation_torque_nm": c["slip"],
+            "saturation_twist_mrad": 1e3 * c["slip_twist"],
+        },
+    ),
+    Hidden(
+        "input_coulomb_viscous",
+        friction,
+        lacks=("coulomb", "viscous"),
+        rigid=True,
+        most=3,
+        numbers=lambda d, c: {"coulomb_nm": c["extra_coulomb"], "viscous_nm_s_per_rad": c["extra_viscous"]},
+    ),
+    Hidden(
+        "output encoder eccentricity",
+        lambda d, r, x, same: {"encoder_once": 4e-5 * x, "encoder_phase": TURN * r[0]},
+        channels=OUTPUT,
+        accepted=ECCENTRIC,
+        rigid=True,
+        numbers=lambda d, c: {"output_angle.eccentricity_arcmin": c["encoder_once"] / ARCMIN},
+    ),
+    Hidden(
+        "load_side_friction",
+        output_friction,
+        rigid=True,
+        most=10,
+        numbers=lambda d, c: {"coulomb_nm": c["output_coulomb"], "viscous_nm_s_per_rad": c["output_viscous"]},
+    ),
+    Hidden(
+        "unbalance",
+        lambda d, r, x, same: {"unbalance": 0.1 * d.torques[0] / GRAVITY * x, "unbalance_phase": TURN * r[0]},
+        rigid=True,
+        most=10,
+        numbers=lambda d, c: {"output_kg_m": c["unbalance"]},
+    ),
+    Hidden(
+        "lugre_friction",
+        bristles,
+        rigid=True,
+        most=4,
+        motions=("multisine", "moves", "creep"),
+        numbers=lambda d, c: {"coulomb_nm": c["bristle_coulomb"], "static_nm": c["bristle_static"]},
+    ),
+    Hidden(
+        "torque-sensor ripple",
+        sensor_ripple,
+        channels=("output_torque",),
+        accepted=("sensors",),
+        rigid=True,
+        numbers=lambda d, c: {"output_torque.ripple.0.amplitude_nm": c["sensor_ripple"]},
+    ),
+    Hidden(
+        "stiffness_nonlinearity",
+        lambda d, r, x, same: {"cubic": 0.05 * d.stiffness[0] / _twist(d) ** 2 * x},
+        channels=OUTPUT,
+        loaded=True,
+        most=30,
+        motions=SWINGS,
+        numbers=lambda d, c: {"cubic_nm_per_rad3": c["cubic"]},
+    ),
+    Hidden(
+        "load_dependent_loss",
+        loss,
+        lacks=("load_loss",),
+        loaded=True,
+        rigid=True,
+        most=6,
+        numbers=lambda d, c: {"coefficient": c["driving_loss"]},
+    ),
+    Hidden(
+        "torsional_hysteresis_maxwell",
+        hysteresis(0.9),
+        channels=OUTPUT,
+        accepted=HYSTERESIS,
+        loaded=True,
+        most=10,
+        motions=SWINGS,
+    ),
+    Hidden(
+        "thermal_friction",
+        thermal,
+        rigid=True,
+        most=5,
+        seconds=15.0,
+        motions=("multisine", "moves", "plateaus"),
+        numbers=lambda d, c: {"viscosity_coefficient_per_k": c["thermal"]},
+    ),
+    Hidden(
+        "wave_generator_eccentricity",
+        lambda d, r, x, same: (
+            {"ke_1": 3e-5 * x, "ke_1_phase": TURN * r[0]} | ({} if same else {"ke_2": 0.3e-5 * x})
+        ),
+        channels=OUTPUT,
+        most=40,
+    ),
+    Hidden(
+        "unbalance of the rotor",
+        lambda d, r, x, same: {
+            "rotor_unbalance": 0.2 * d.coulomb / GRAVITY * x,
+            "rotor_unbalance_phase": TURN * r[0],
+        },
+        accepted=("unbalance",),
+        rigid=True,
+        most=4,
+        numbers=lambda d, c: {"motor_kg_m": c["rotor_unbalance"]},
+    ),
     Hidden("damaged_tooth", dent, channels=OUTPUT, most=40, numbers=dent_numbers),
-    Hidden("output_eccentricity", lambda d, r, x, same: {"ke_out": 4e-5 * x, "ke_out_phase": TURN * r[0]},
-           channels=OUTPUT, accepted=ECCENTRIC),
-    Hidden("output encoder delay", lambda d, r, x, same: {"delay": 3e-4 * x}, channels=OUTPUT, accepted=("sensors",),
-           rigid=True, most=20, motions=SWINGS, numbers=lambda d, c: {"output_angle.delay_s": c["delay"]}),
-)  # fmt: skip
+    Hidden(
+        "output_eccentricity",
+        lambda d, r, x, same: {"ke_out": 4e-5 * x, "ke_out_phase": TURN * r[0]},
+        channels=OUTPUT,
+        accepted=ECCENTRIC,
+    ),
+    Hidden(
+        "output encoder delay",
+        lambda d, r, x, same: {"delay": 3e-4 * x},
+        channels=OUTPUT,
+        accepted=("sensors",),
+        rigid=True,
+        most=20,
+        motions=SWINGS,
+        numbers=lambda d, c: {"output_angle.delay_s": c["delay"]},
+    ),
+)
 
 PAIRS = (
     ("kinematic_error", "stribeck_friction"),
@@ -201,19 +324,3 @@ PAIRS = (
     ("torque-sensor ripple", "stribeck_friction"),
     ("load_dependent_loss", "output encoder eccentricity"),
 )
-
-#: Not in the catalogue.
-OUTSIDE = (
-    Hidden("end stop", lambda d, r, x, same: {"stop": d.stiffness[0] * 0.002 * x, "stop_at": 0.1 + 0.3 * r[0]},
-           motions=("multisine", "moves", "plateaus"), rigid=True, most=200),
-    Hidden("cable", lambda d, r, x, same: {"cable": 0.2 * d.torques[0] * x, "cable_at": 0.8 * r[0] - 0.4,
-           "cable_width": 0.1 + 0.2 * r[1]}, rigid=True, most=20),
-    Hidden("churning drag", lambda d, r, x, same: {"drag": d.coulomb / d.top_speed**2 * x},
-           motions=("multisine", "moves", "plateaus"), rigid=True, most=15),
-    Hidden("sticky zone", lambda d, r, x, same: {"sticky": 0.7 * d.coulomb * x, "sticky_at": 0.6 * r[0] - 0.3,
-           "sticky_width": 0.08 + 0.1 * r[1]}, rigid=True, most=8),
-    Hidden("slow drift", lambda d, r, x, same: {"drift": 0.7 * d.coulomb * x, "drift_rate": 0.4 + r[0]}, rigid=True,
-           most=10),
-    Hidden("spring catch", lambda d, r, x, same: {"detent": 0.2 * d.torques[0] * x, "detent_at": 0.6 * r[0] - 0.3,
-           "detent_width": 0.05 + 0.06 * r[1]}, rigid=True, most=15),
-)  # fmt: skip

@@ -1,7 +1,7 @@
 """What a MuJoCo plant is made of, and the laws that MuJoCo lacks, in its callback for passive forces.
 
-Friction that follows the sign's tanh, the stiffer segments of the spring, kinematic error with its reaction on the
-motor, hysteresis. Nothing here imports hdsim. Units are SI.
+Friction that follows the sign's tanh, the stiffer segments of the spring, kinematic error with its reaction
+on the motor, hysteresis. Nothing here imports hdsim. Units are SI.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""A harmonic drive in MuJoCo: motor and wave generator, output with its load, between them a tendon or an equality.
+"""A harmonic drive in MuJoCo: motor with wave generator, output with load, a tendon or an equality between.
 
-MuJoCo integrates (RK4) and has the inertias, gravity on the arm and on unbalanced masses, the first stiffness
-with its damping and its play (a fixed tendon of length motor / ratio - output with a spring, a cubic and a dead
-band), the rigid transmission (a joint equality), LuGre friction and cogging (``dcmotor``), the lag of the current
-(a filter), dry friction at the output and an end stop (constraints), and drag. The rest is in ``mujoco_laws``.
-Nothing here imports hdsim. Units are SI.
+MuJoCo integrates (RK4) and has the inertias, gravity on the arm and on unbalanced masses, the first
+stiffness with its damping and its play (a fixed tendon of length motor / ratio - output with a spring, a
+cubic and a dead band), the rigid transmission (a joint equality), LuGre friction and cogging (``dcmotor``),
+the lag of the current (a filter), dry friction at the output and an end stop (constraints), and drag. The
+rest is in ``mujoco_laws``. Nothing here imports hdsim. Units are SI.
 """
 
 from __future__ import annotations
@@ -170,13 +170,14 @@ def simulate(
     for name, value in zip(Numbers._fields, p, strict=True):
         board[name] = value
     board["angles"], board["speeds"] = data.qpos.ctypes.data, data.qvel.ctypes.data
-    board["forces"], board["temperature"] = data.qfrcpassive.ctypes.data, 20.0
+    board["forces"], board["temperature"] = data.qfrc_passive.ctypes.data, 20.0
     rows = len(motion.load) // motion.rows_every
     log = np.zeros((rows, 9))
     reference = motion.reference * p.ratio
     start = float(motion.reference[0, 0])
     data.qpos[:] = (p.ratio * start, start) if like is None else like[0, [0, 2]]
-    data.qvel[:] = (0.0, 0.0) if like is None else like[0, [1, 3]]
+    speed = float(motion.reference[0, 1])
+    data.qvel[:] = (p.ratio * speed, speed) if like is None else like[0, [1, 3]]
     # At rest where the log begins: the drive is wound up by what hangs on it.
     hanging = p.arm * math.sin(start) - float(motion.load[0])
     if not p.rigid and like is None:

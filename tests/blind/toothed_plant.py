@@ -1,4 +1,4 @@
-"""hdsim's toothed drive as a plant: its mesh, what it is told, and its simulation through a scenario's files."""
+"""hdsim's toothed drive as a plant: its mesh, what it is told, its simulation through a scenario's files."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Effects = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class Teeth:
-    """The mesh of a plant: its model and ring, half-gaps over the nominal ones (0: no gap), and its flanks' seed."""
+    """The mesh of a plant: model, ring, half-gaps over the nominal ones (0: no gap), its flanks' seed."""
 
     model: str
     ring: str
@@ -47,11 +47,14 @@ class Teeth:
                 "contact": {"law": "constant", "contact_stiffness_n_per_m": 6e9 * radius},
             }
         # Heights of a Weierstrass-Mandelbrot profile go with G^(D - 2).
-        flanks = {
-            name: {"fractal_dimension": dimension, "fractal_roughness_m": roughness * self.gap ** (1 / (dimension - 2))}
-            for name, dimension, roughness in (("circular_spline", 2.4272, 1.245e-10), ("flexspline", 2.643, 1.8648e-10))
-        }  # fmt: skip
-        return mesh | {"flanks": flanks | {"seed": self.seed}}
+        flanks: dict[str, Any] = {"seed": self.seed}
+        for name, dimension, roughness in (
+            ("circular_spline", 2.4272, 1.245e-10),
+            ("flexspline", 2.643, 1.8648e-10),
+        ):
+            scaled = roughness * self.gap ** (1 / (dimension - 2))
+            flanks[name] = {"fractal_dimension": dimension, "fractal_roughness_m": scaled}
+        return mesh | {"flanks": flanks}
 
 
 def pitch_radius(d: Drive) -> float:
@@ -104,7 +107,7 @@ def simulate(
         effects: settings of the effects, by name.
         given: what the plant is told.
         rate: of the samples, Hz.
-        like: motor angles at ``LIKE_HZ`` that are prescribed instead of controlled, the time before the log included.
+        like: motor angles at ``LIKE_HZ`` that are prescribed, the time before the log included.
     """
     wide = 0.8 * math.sqrt(d.stiffness[0] / d.load_inertia)
     inertia = d.motor_inertia + d.load_inertia / d.ratio**2
@@ -115,7 +118,8 @@ def simulate(
     sampled = max(rate, LOG_HZ)
     column = {"type": "recorded", "interpolation": "spline"}
     motor: dict[str, Any] = {
-        "type": "position", "at": "output", "trajectory": column | {"file": "told.csv", "value_column": "angle"},
+        "type": "position", "at": "output",
+        "trajectory": column | {"file": "told.csv", "value_column": "angle"},
         "controller": {"type": "cascade", "position_gain_per_s": 0.15 * wide,
                        "velocity_gain_nm_s_per_rad": wide * inertia,
                        "velocity_integral_gain_nm_per_rad": 0.2 * wide**2 * inertia}}  # fmt: skip
