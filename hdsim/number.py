@@ -55,10 +55,15 @@ def limits(metadata: Iterable[Any]) -> tuple[float, float]:
 
 
 def plausible(metadata: Iterable[Any]) -> tuple[float, float]:
-    """The range that a field's sources have (metadata with ``low`` and ``high``), within what it allows."""
+    """The range that a field's sources have (metadata with ``low`` and ``high``), within what it allows.
+
+    A range in multiples of a drive's number (``of``) is none here, where no drive is known.
+    """
     metadata = list(metadata)
     least, most = limits(metadata)
     for each in metadata:
+        if getattr(each, "of", ""):
+            continue
         least = max(least, float(_or(getattr(each, "low", None), least)))
         most = min(most, float(_or(getattr(each, "high", None), most)))
     return least, most
