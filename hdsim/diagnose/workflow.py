@@ -122,8 +122,6 @@ def _diagnosed(
         except PredictionError as error:
             names = ", ".join(record.name for record in records)
             raise InputError(f"{names}: the model cannot follow the measured motion: {error}") from None
-        doubts = suspicions(bench, base, start)
-        problems += doubts
 
     running = contextlib.ExitStack()
 
@@ -158,6 +156,9 @@ def _diagnosed(
     if current is not found.fit:
         with step("prove", "proving on held-out data"):
             gap, predictions = gaps(bench, states | {"after": current.state})
+    # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
+    doubts = suspicions(bench, replace(base, fit=current), start)
+    problems += doubts
     intervals = [i for i in base_intervals(current, base.freedoms) if i.determined]
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)
@@ -179,7 +180,9 @@ def _diagnosed(
         "curve": curve.found() if curve is not None else None,
         "seconds": seconds,
     }
-    if unknown and (evidence.laws or evidence.rest is None or evidence.rest.times_noise <= RULES.rest):
+    patterned = evidence.left_chance <= RULES.chance and evidence.left >= RULES.structured
+    noisy = evidence.rest is not None and evidence.rest.times_noise > RULES.rest
+    if unknown and (evidence.laws or patterned or not noisy):
         verdict = _without_a_name(found.stages, evidence, common)
     elif unknown:
         verdict = _without_a_place(bench, found.fit, common)

@@ -136,7 +136,8 @@ def _numbers(bench: Bench, base: Refit, after: list[Array], scales: list[Problem
         if series.channel != "output_angle" and rests[1] > MISSED * varies:
             worse.append(f"{series.channel} is missed by {rests[1] / varies:.2g} times its own variation")
     far = []
-    for free, theta in zip(base.fit.frees, base.fit.theta, strict=True):
+    for free, away in zip(base.fit.frees, base.fit.theta, strict=True):
+        theta = float(away) - free.given  # from the model's own number, wherever the fit began
         if free.delay_of:
             continue  # a delay has no scale to be far from
         limit = math.log(free.far)

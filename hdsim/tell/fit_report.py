@@ -112,7 +112,7 @@ def page(found: Estimation, result: FitResult, pictures: dict[str, str]) -> str:
         result: what it found.
         pictures: figures as HTML, by name.
     """
-    css = files("hdsim.diagnose").joinpath("page.css").read_text(encoding="utf-8")
+    css = files("hdsim.tell").joinpath("page.css").read_text(encoding="utf-8")
     said = html.escape(summary(result))
     numbers = numbers_table(result.numbers, result.moved)
     gaps = table(GAP_HEAD, gap_rows(result), range(2, len(GAP_HEAD)))

@@ -1,5 +1,7 @@
 """What only the model can tell: scales of torques that stand alone, and logs of other drives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
@@ -136,3 +138,23 @@ def test_a_real_joint_under_a_base_that_lacks_friction_is_not_suspected(joint):
     mapping = ROOT / "scenarios" / "mappings" / f"kinova_joint_{joint}.yaml"
     record = record_from(hdsim.import_recording(KINOVA, mapping), f"joint {joint}")
     assert suspected([record], hdsim.load_scenario(base), load="output_torque") == []
+
+
+def test_a_number_that_later_fits_bring_back_is_no_longer_suspected(tmp_path):
+    model, record = scenario(tmp_path), scaled(coulomb=0.25)
+    bench, start = Bench(predictors([record], model.drive.ratio)), state_of(model)
+    base = refit(bench, start)
+    assert suspicions(bench, base, start) == []
+    k = [free.name for free in base.fit.frees].index("drive.inertia.motor_kg_m2")
+    bent = base.fit.theta.copy()
+    bent[k] = np.log(20.0)
+    (found,) = suspicions(bench, replace(base, fit=replace(base.fit, theta=bent)), start)
+    assert "drive.inertia.motor_kg_m2 is 20 times" in found.message
+    # A later fit begins where the re-fit ended: its own factor of 1 is still 20 times the model's number.
+    frees = list(base.fit.frees)
+    frees[k] = frees[k].moved(bent[k])
+    bent[k] = 0.0
+    (again,) = suspicions(bench, replace(base, fit=replace(base.fit, frees=frees, theta=bent)), start)
+    assert "drive.inertia.motor_kg_m2 is 20 times" in again.message
+    bent[k] = -np.log(20.0)
+    assert suspicions(bench, replace(base, fit=replace(base.fit, frees=frees, theta=bent)), start) == []

@@ -178,6 +178,11 @@ def test_a_number_outside_of_what_its_sources_have_stands_at_its_limit():
         low, high, source = 1.0, 10.0, "a book"
 
     assert number.plausible([Range()]) == (1.0, 10.0)
+
+    class Relative(Range):
+        of = "rated_torque"
+
+    assert number.plausible([Relative()]) == (-math.inf, math.inf)
     metadata = catalogue()["load_dependent_loss"].model_fields["coefficient"].metadata
     assert number.limits(metadata) == (0.0, 1.0)
     assert number.plausible([*metadata, Range()]) == (1.0, 1.0)
