@@ -37,9 +37,11 @@ CURVE = CurveFound(
 
 def confident(probability: float, **evidence):
     """A named effect of this probability."""
-    found = told(EFFECT.model_copy(update=evidence))
+    found = told(EFFECT)
     effects = [one.model_copy(update={"confidence": probability}) for one in found.verdict.effects]
-    return type(found)(found.verdict.model_copy(update={"effects": effects}), found.evidence)
+    return type(found)(
+        found.verdict.model_copy(update={"effects": effects}), EFFECT.model_copy(update=evidence)
+    )
 
 
 @pytest.mark.parametrize(
@@ -102,7 +104,7 @@ def test_a_group_is_sure_as_a_group():
 
 
 def test_each_of_several_names_has_its_own_probability():
-    found = told(EFFECT.model_copy(update={"laws": [law(), law("unbalance", sampled=0.1, beyond=0.05)]}))
+    found = told(EFFECT.model_copy(update={"laws": [law(), law("unbalance", sampled=0.95, beyond=0.97)]}))
     first, second, chance = sureness(found).details
     assert first == "Motor torque ripple: over 99 in 100 of such names are right."
     assert second.startswith("Unbalance: ")
