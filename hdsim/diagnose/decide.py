@@ -112,6 +112,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     """Each piece of evidence on an effect: what it is, what was seen, its weight in log odds."""
     law = evidence.laws[k]
     explained = rules.explained * (_log_odds(evidence.explained) - _log_odds(rules.explained_even))
+    held = rules.held * _held(evidence, rules)
     found = [
         # What all explain together speaks for the first; of a later one it only says that all are too little.
         (
@@ -119,13 +120,16 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
             evidence.explained,
             min(explained, 0.0) if k else explained,
         ),
-        ("held-out data show the promised change", evidence.held.slope, rules.held * _held(evidence, rules)),
+        ("held-out data show the promised change", evidence.held.slope, min(held, 0.0) if k else held),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
     if law.at_limit:
         found.append(("a number stands at the end of its range", 1.0, rules.limit))
     if k > 0:
         found.append(("one more effect", float(k), rules.later))
+        found.append(
+            ("part of what a channel lacked that it explains", law.gain, rules.gain * _log_odds(law.gain))
+        )
         found.append(
             (
                 "what it explains beyond smooth curves over the others' coordinates",

@@ -43,6 +43,12 @@ class Rules(Part):
     beyond: float = _rule(
         1.5, "log odds per log odds", "weight of what an effect explains beyond smooth curves", "chosen"
     )
+    gain: float = _rule(
+        0.5,
+        "log odds per log odds",
+        "weight of the part of what a channel lacked that a later one explains",
+        "chosen",
+    )
     believed: float = _rule(0.6, "probability", "least confidence of a name that is given", "chosen")
     structured: float = _rule(
         0.12,

@@ -168,10 +168,9 @@ def _one_more(
 
 def beyond_curves(bench: Bench, current: Fit, left: Residual, named: Sequence[Named]) -> Residual:
     """A residual without what smooth curves over the coordinates of the named effects explain."""
-    homes = set()
-    for one in named:
-        signature = catalogue()[one.name].signature
-        homes |= {(signature.lives_in[0], channel) for channel in signature.channels}
+    homes = {
+        (catalogue()[one.name].signature.lives_in[0], channel) for one in named for channel in bench.channels
+    }
     curves = curves_over(bench, bench.residuals(current.predictions), homes)
     return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
 

@@ -19,7 +19,7 @@ from hdsim.diagnose.evidence import Evidence
 from hdsim.diagnose.rules import RULES, Rules
 
 #: Weights that are fitted, in the order in which ``weighed`` uses them, and their prior's standard deviation.
-WEIGHTS = ("odds", "explained", "held", "sampled", "limit", "later", "beyond")
+WEIGHTS = ("odds", "explained", "held", "sampled", "limit", "later", "beyond", "gain")
 SPREAD = 1.0
 
 
