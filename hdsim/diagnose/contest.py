@@ -26,6 +26,8 @@ from hdsim.estimate.vector import Vector, sensitivities
 #: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
 #: be fitted further, and from the numbers as given.
 ROUGH, FULL, LEFT_IN, FAR_LEFT_IN = 5, 12, 2.0, 3.0
+#: Most candidates that are.
+FAR_MOST = 3
 #: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
 FAR = 0.7
 #: What a fit may leave, in units of the noise, to count as one that has reached it.
@@ -107,8 +109,10 @@ def contest(
     if any(abs(t) > FAR for t in base.theta) and least > REACHED * noise:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             given = _as_given(bench, base)
+            nearest = sorted(best, key=lambda name: best[name][0])[:FAR_MOST]
+            nearest = [name for name in nearest if best[name][0] <= FAR_LEFT_IN * least]
             for one in shortlist:
-                if one.name in best and best[one.name][0] <= FAR_LEFT_IN * least:
+                if one.name in nearest:
                     tell(f"fitting {one.name} from the numbers as given")
                     for each in (one, *one.others):
                         keep(one.name, _from_given(bench, base, given, each.added))

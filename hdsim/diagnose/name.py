@@ -16,7 +16,7 @@ from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, settled
+from hdsim.estimate.fit import Fit
 from hdsim.estimate.records import Array
 
 #: Largest chance at which a search may name an effect.
@@ -61,7 +61,7 @@ class Named:
         confidence: share of resampled records (over blocks) in which it, or its group, is best.
         share: of the residual, which its trace explained on the screen.
         chance: of the search that found it.
-        alternatives: fits of the others on the shortlist.
+        alternatives: fits of the others on the shortlist, carried on to their optimum but not proved there.
         candidates: all that were fitted, the best first, as evidence.
         gain: part of the first pass's structure that it explained; set by the search.
         beyond: part of its trace's share that curves over the others' coordinates leave it; likewise.
@@ -151,16 +151,13 @@ def name_effect(
             group[other] = float((before - rest).sum()) / explained
     return Named(
         name,
-        settled(bench, found, len(base.state.added)),
+        found,
         losses,
         group,
         _confidence(results, {name, *group}),
         on_screen[name].share.share,
         screening.chance,
-        {
-            o: settled(bench, each, len(base.state.added)) if o in group else each
-            for o, each, _ in results[1:]
-        },
+        {other: each for other, each, _ in results[1:]},
         [_as_evidence(result, results[0], before, whole, on_screen[result[0]]) for result in results],
     )
 

@@ -25,7 +25,7 @@ from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.fit import Fit, at_present, fit, settled, sharpened
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import align, reweigh, with_delays
@@ -83,6 +83,8 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
             continue
         late = with_delays(bench, found.fit)
         if late is None:
+            if found.named:
+                found.fit = settled(bench, found.fit)
             return found
         noise = sum(bench.noise_powers.values())
         left, now = (bench.power(each.predictions) - noise for each in (found.fit, late))
@@ -115,12 +117,12 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     stage.named = named
     found.named.append(named)
-    current = named.fit
+    current = named.fit if len(found.named) > 1 else sharpened(bench, named.fit)
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
         tell = during("again", "asking each name again beside the others")
-        current = _again(bench, base, together(bench, current), found, tell)
+        current = _again(bench, base, together(bench, current, rough=True), found, tell)
         align(bench, current)
         reweigh(bench, current)
     return current
@@ -189,9 +191,9 @@ def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
     return any(last[c] - noise[c] >= BEYOND_GAIN * (first[c] - noise[c]) for c in first)
 
 
-def together(bench: Bench, found: Fit, state: State | None = None) -> Fit:
-    """All numbers fitted together: the base's and those of all effects."""
-    return fit(bench, state or found.state, at_present(found), prune=False, beside=found.beside)
+def together(bench: Bench, found: Fit, state: State | None = None, *, rough: bool = False) -> Fit:
+    """All numbers fitted together: the base's and those of all effects; ``rough`` as in ``fit``."""
+    return fit(bench, state or found.state, at_present(found), prune=False, beside=found.beside, rough=rough)
 
 
 def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:
@@ -214,7 +216,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         added = list(current.state.added)
         others = added[:k] + added[k + 1 :]
         try:
-            without = together(bench, current, replace(current.state, added=tuple(others)))
+            without = together(bench, current, replace(current.state, added=tuple(others)), rough=True)
         except (PredictionError, np.linalg.LinAlgError):
             k += 1
             continue
@@ -242,7 +244,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
                 # It was fitted last: back to its place.
                 fitted = named.fit.state.added[-1]
                 state = replace(named.fit.state, added=(*others[:k], fitted, *others[k:]))
-                current = together(bench, named.fit, state)
+                current = together(bench, named.fit, state, rough=True)
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from hdsim.estimate.minimise import EVALUATIONS, minimised
 from hdsim.estimate.numbers import Free, Interval
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State
-from hdsim.estimate.vector import Measured, Vector
+from hdsim.estimate.vector import Measured, Vector, sensitivities
 
 #: Largest logarithm of the factor to either end of an interval: e^20 says enough of what nobody knows.
 WIDEST = 20.0
@@ -136,6 +136,12 @@ def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
     known = found.columns, math.nan
     return fit(bench, found.state, at_present(found), held_effects=held_effects, prune=False,
                evaluations=EVALUATIONS, beside=found.beside, known=known)  # fmt: skip
+
+
+def sharpened(bench: Bench, found: Fit) -> Fit:
+    """A rough fit with the sensitivities made anew where it ended."""
+    vector = Vector(found.state, tuple(at_present(found)), 0)
+    return replace(found, columns=sensitivities(bench, vector, vector.start(), found.predictions))
 
 
 def at_present(found: Fit) -> list[Free]:

@@ -63,7 +63,7 @@ def minimised(
     """
     from scipy.optimize import least_squares
 
-    slopes = Slopes(problem, known)
+    slopes = Slopes(problem, known, thrifty=rough)
     start = problem.residual(x0)
     slopes.rest[x0.tobytes()] = start
     worth, priors = 1.0 / math.sqrt(power), problem.priors

@@ -30,10 +30,11 @@ class Slopes:
     Args:
         problem: what is fitted.
         known: the sensitivities near the start to the first numbers, shape (rows, up to p), where known.
+        thrifty: make them anew only where the last step has led away.
     """
 
-    def __init__(self, problem: Problem, known: Array | None = None) -> None:
-        self._problem = problem
+    def __init__(self, problem: Problem, known: Array | None = None, *, thrifty: bool = False) -> None:
+        self._problem, self._thrifty = problem, thrifty
         self._columns = known
         self._at: Array | None = None if known is None else np.zeros(0)
         #: Residuals by the bytes of where they were seen.
@@ -91,7 +92,8 @@ class Slopes:
         size = float(np.linalg.norm(missed))
         if size <= NEGLIGIBLE * np.linalg.norm(now):
             return self._columns  # of the order of the solver's noise, from which nothing is learned
-        if size > FORETOLD * np.linalg.norm(change):
+        led_away = np.linalg.norm(now) >= np.linalg.norm(before)
+        if size > FORETOLD * np.linalg.norm(change) and (led_away or not self._thrifty):
             return self.exact(x)
         scaled = np.einsum("ij,ij->j", self._columns, self._columns) * step
         self._columns = self._columns + np.outer(missed, scaled / max(float(step @ scaled), 1e-300))

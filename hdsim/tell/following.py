@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from hdsim.diagnose.experiment import propose
 from hdsim.errors import InputError
+from hdsim.estimate.fit import settled
 from hdsim.tell.words import title_of
 
 if TYPE_CHECKING:
@@ -28,13 +29,14 @@ def candidates(diagnosis: Diagnosis) -> dict[str, Fit]:
     """
     if diagnosis.verdict.verdict != "effect":
         return {}
-    for one in diagnosis.named:
+    bench = diagnosis.bench
+    for k, one in enumerate(diagnosis.named):
         others = {name: one.alternatives[name] for name in one.group if name in one.alternatives}
         if others:
-            return {one.name: one.fit, **others}
+            return {name: settled(bench, each, k) for name, each in {one.name: one.fit, **others}.items()}
     last = diagnosis.named[-1]
     if diagnosis.verdict.effects[-1].confidence < WEAK and len(diagnosis.named) == 1:
-        return {last.name: last.fit, NOTHING: diagnosis.refit.fit}
+        return {last.name: settled(bench, last.fit), NOTHING: diagnosis.refit.fit}
     return {}
 
 
