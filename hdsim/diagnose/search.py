@@ -146,7 +146,10 @@ def _one_more(
     places = stage.location.places
     if stage.screening is None:
         tell = during("screen", "screening the catalogue")
-        screening = screen(bench, current.state, left, stage.location.lines, places=places, on_step=tell)
+        first = found.stages[0].screening
+        screening = screen(
+            bench, current.state, left, stage.location.lines, places=places, before=first, on_step=tell
+        )
     else:
         screening = ranked_anew(stage.screening, left)
     if stage.screening is None or screening.chance < stage.screening.chance:
@@ -171,7 +174,10 @@ def _one_more(
 def beyond_curves(bench: Bench, current: Fit, left: Residual, named: Sequence[Named]) -> Residual:
     """A residual without what smooth curves over the coordinates of the named effects explain."""
     homes = {
-        (catalogue()[one.name].signature.lives_in[0], channel) for one in named for channel in bench.channels
+        (coordinate, channel)
+        for one in named
+        for coordinate in catalogue()[one.name].signature.lives_in
+        for channel in bench.channels
     }
     curves = curves_over(bench, bench.residuals(current.predictions), homes)
     return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
@@ -226,7 +232,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
         for channel in bench.channels:
             lines += order_lines(bench, residuals, channel)
         tell(f"{own.name} again")
-        screening = screen(bench, without.state, left, lines)
+        screening = screen(bench, without.state, left, lines, before=found.stages[0].screening)
         named = None
         if screening.ranked and screening.chance <= LEVEL:
             named = name_effect(bench, without, screening, left, on_step=tell)

@@ -55,11 +55,15 @@ class Screening:
         ranked: by falling share, one entry an effect.
         chance: probability that the search finds the best share where nothing is missing.
         skipped: effects that could not be tried, with the reason.
+        seen: traces that were simulated, whitened with ``sigmas``, by effect, way of fitting and shapes.
+        sigmas: of every series when they were.
     """
 
     ranked: list[Screened] = field(default_factory=list)
     chance: float = 1.0
     skipped: dict[str, str] = field(default_factory=dict)
+    seen: dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array]] = field(default_factory=dict)
+    sigmas: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def screen(
@@ -69,6 +73,7 @@ def screen(
     lines: Sequence[Line],
     *,
     places: Sequence[Place] = (),
+    before: Screening | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Screening:
     """Rank every effect of the catalogue by the share of the residual that its trace explains.
@@ -79,9 +84,11 @@ def screen(
         residual: what it leaves.
         lines: peaks of the order spectra.
         places: where the residual lives; fittings with many starts are left out where theirs shows nothing.
+        before: an earlier screening of these data. What an effect does is nearly the same whatever other
+            effects the model has by now, so its traces serve again; those that come near are refined anew.
         on_step: told what is being tried.
     """
-    found = Screening()
+    found = Screening(sigmas=np.array([series.sigma for series in bench.series]))
     shares: list[Share] = []
     present = set(state.effects) | {added.effect for added in state.added}
     tried: list[Added] = []
@@ -122,12 +129,17 @@ def screen(
     with bench.coarse():
         without = bench.predict(state)
 
-    def look(several: Sequence[Added]) -> None:
+    def look(several: Sequence[Added], *, first: bool = True) -> None:
+        known = _known(before, several, found.sigmas, bench) if first else []
+        keys = {_key(added) for added, _ in known}
         with bench.coarse():
-            found_traces = traces(bench, state, without, several, wanted)
+            new = [added for added in several if _key(added) not in keys]
+            found_traces = known + traces(bench, state, without, new, wanted)
         for added, columns in found_traces:
             if columns is None or not np.any(columns):
                 continue
+            if first and not added.orders:
+                found.seen[_key(added)] = added, columns
             share = _allowed(residual, columns, added.fitting.signed(added.orders))
             shares.append(share)
             key = added.effect, added.fitting.label
@@ -145,7 +157,7 @@ def screen(
     for times in range(REFINED):
         most = max((one.share.share for one in kinds.values()), default=0.0)
         worth = [one for one in kinds.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
-        look([added for one in worth for added in _neighbours(one.added, times)])
+        look([added for one in worth for added in _neighbours(one.added, times)], first=False)
     best: dict[str, Screened] = {}
     for one in sorted(kinds.values(), key=lambda one: -one.share.share):
         first = best.setdefault(one.name, one)
@@ -157,6 +169,25 @@ def screen(
     found.ranked += best.values()
     if found.ranked:
         found.chance = chance_of(found.ranked[0].share, shares)
+    return found
+
+
+def _key(added: Added) -> tuple[str, str, tuple[float, ...]]:
+    return added.effect, added.fitting.label, added.shapes
+
+
+def _known(
+    before: Screening | None, wanted: Sequence[Added], sigmas: Array, bench: Bench
+) -> list[tuple[Added, Array | None]]:
+    """Traces of an earlier screening in these weights; without those whose orders are read from the data."""
+    if before is None:
+        return []
+    factor = (before.sigmas / sigmas)[bench.stacked_series()][:, None]
+    found: list[tuple[Added, Array | None]] = []
+    for added in wanted:
+        if not added.orders and _key(added) in before.seen:
+            earlier, columns = before.seen[_key(added)]
+            found.append((earlier, columns * factor))
     return found
 
 

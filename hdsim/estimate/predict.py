@@ -33,7 +33,7 @@ LEAD_IN_S = 0.5
 CARRIED = "carried_torque"
 #: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
 #: noise in a Jacobian looks like information; and the tolerance of a search, whose steps are larger.
-RTOL, COARSE_RTOL = 1e-6, 1e-5
+RTOL, COARSE_RTOL = 1e-6, 3e-5
 
 Locked = Literal["", "motor", "output"]
 LoadSource = Literal["scenario", "load_torque", "output_torque"]
