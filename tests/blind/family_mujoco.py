@@ -10,7 +10,7 @@ of it at most. What is only a number of the base counts as it is.
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from contract import Case, Kind, Measured
@@ -147,13 +147,14 @@ class Visibility:
         if not p.rigid:
             varied.append({k: getattr(p, k) * (1 + CHANGE) for k in ("k1", "k2", "k3")})
         columns = [self._weighed(changes) - self.plain for changes in varied]
-        # What the rest does along a prescribed motion is known without a simulation.
+        # What the rest does along a prescribed motion is known without a simulation. What the base has as
+        # zero is none of its numbers.
         speed, joint = like[:, 1], like[:, 4]
         sign, accelerated = np.tanh(speed / 0.5), acceleration(like, 1.0 / x.rows_hz)
-        columns += [
-            self._column(motor_torque=torque)
-            for torque in (accelerated, sign, speed, np.abs(joint) * sign, like[:, 5])
-        ]
+        torques = [accelerated, like[:, 5]]
+        friction = {"coulomb": sign, "viscous": speed, "load_loss": np.abs(joint) * sign}
+        torques += [torque for name, torque in friction.items() if getattr(p, name)]
+        columns += [self._column(motor_torque=torque) for torque in torques]
         if p.rigid:
             loads = (accelerated / p.ratio, *((np.sin(like[:, 2]),) if p.arm else ()))
             columns += [self._column(motor_torque=load / p.ratio, output_torque=load) for load in loads]
@@ -213,7 +214,8 @@ def draw_experiment(
     if weighed and not arm and sensing.kind != "known load":
         drive = draw_drive(rng, arm=True, rigid=rigid)
         sensing = draw_sensing(rng, drive, kinds, fast=any(h.fast for h in hidden))
-    drive = slower(drive, sensing.rate)
+    faster = max((h.speed for h in hidden), default=1.0)
+    drive = slower(replace(drive, top_speed=faster * drive.top_speed), sensing.rate)
     tick = int(rng.choice([5, 2]))
     least = max([5.0, *(h.seconds for h in hidden)])
     given, held, _ = draw_lengths(rng, sensing.rate, least=least)
@@ -282,7 +284,9 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
     if x.drive.rigid:
         names = tuple(n for n in names if n != "stiffness")
     changes: Changes = {}
-    strengths, truth, near = [], {}, 1.0
+    strengths: list[float] = []
+    asked: list[float] = []
+    truth, near = {}, 1.0
     same = bool(rng.random() < 0.4)
     if hidden or names:
         seen = Visibility(x)
@@ -291,6 +295,7 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
         own, reached = seen.sized(h, rng.random(6).tolist(), same, wanted)
         changes |= own
         strengths.append(round(reached, 3))
+        asked.append(round(wanted, 3))
         near = min(near, reached / wanted)
         if same and h.numbers is not None:
             truth |= h.numbers(x.drive, own)
@@ -308,7 +313,7 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
         "held": "files" if held else "stretches", "motion": x.kinds, "temperature": sensing.temperature,
         "formula": "other" if hidden and (kind == "outside" or not same) else "catalogue",
         "mesh": "rigid" if x.drive.rigid else "lumped", "load": "arm" if x.drive.arm else "inertia",
-        "size": x.drive.size, "ratio": x.drive.ratio, "changes": changes,
+        "size": x.drive.size, "ratio": x.drive.ratio, "changes": changes, "asked": tuple(asked),
         "noise": {c: sensing.sigma(c) for c in sensing.channels},
     }  # fmt: skip
     lacks = [name for h in hidden for name in h.lacks]

@@ -36,6 +36,7 @@ class Hidden:
         lacks: numbers of the friction that the base must not have.
         fast: needs a log of 500 Hz or more.
         seconds: least length of a record, s.
+        speed: factor on the motions' speed.
         numbers: true values by field, where the formula is the catalogue's.
     """
 
@@ -50,6 +51,7 @@ class Hidden:
     lacks: tuple[str, ...] = ()
     fast: bool = False
     seconds: float = 0.0
+    speed: float = 1.0
     numbers: Callable[[Drive, Changes], dict[str, float]] | None = None
 
 
@@ -119,7 +121,7 @@ def loss(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
 def thermal(d: Drive, r: Sequence[float], x: float, same: bool) -> Changes:
     power = (d.coulomb + 0.4 * d.viscous * d.top_speed) * 0.4 * d.top_speed
     return {"thermal": 0.02 * x, "thermal_offset": 0.0 if same else 95.0,
-            "heat_capacity": (0.4 + 0.5 * r[0]) * power}  # fmt: skip
+            "heat_capacity": (0.12 + 0.2 * r[0]) * power, "heat_resistance": 40.0 / power}  # fmt: skip
 
 
 def hysteresis(spread: float) -> Builder:
@@ -273,8 +275,9 @@ EFFECTS = (
         rigid=True,
         most=5,
         seconds=15.0,
+        fast=True,
+        speed=3.0,
         motions=("multisine", "moves", "plateaus"),
-        numbers=lambda d, c: {"viscosity_coefficient_per_k": c["thermal"]},
     ),
     Hidden(
         "wave_generator_eccentricity",

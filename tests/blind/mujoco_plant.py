@@ -90,12 +90,14 @@ def document(p: Numbers, *, prescribed: bool = False) -> str:
     """The plant as MJCF."""
     arm = p.arm / GRAVITY / p.lever
     across = p.unbalance * math.sin(p.unbalance_phase), p.unbalance * math.cos(p.unbalance_phase)
-    mass = arm + 1.0
+    # What makes the unbalance is heavy and near the axis, so that it hardly has inertia of its own.
+    mass = arm + 1.0 + 50.0 * p.unbalance**2 / p.load_inertia
     place = (across[0] / mass, -(arm * p.lever + across[1]) / mass)
     own = p.load_inertia - mass * (place[0] ** 2 + place[1] ** 2)
-    rotor = p.rotor_unbalance / 0.5
+    weight = 0.5 + 50.0 * p.rotor_unbalance**2 / p.motor_inertia
+    rotor = p.rotor_unbalance / weight
     leaning = rotor * math.sin(p.rotor_unbalance_phase), rotor * math.cos(p.rotor_unbalance_phase)
-    rest = p.motor_inertia - 0.5 * rotor**2
+    rest = p.motor_inertia - weight * rotor**2
     if min(own, rest) <= 0:
         raise FloatingPointError("the masses have more inertia than their bodies")
     armature = f'armature="{PRESCRIBED_INERTIA!r}"' if prescribed else ""
@@ -131,7 +133,7 @@ def document(p: Numbers, *, prescribed: bool = False) -> str:
     <option timestep="{STEP!r}" integrator="RK4" gravity="0 0 {-GRAVITY}"><flag contact="disable"/></option>
     <worldbody>
       <body><joint name="motor" type="hinge" axis="0 1 0" damping="0 {p.drag!r}" {armature}/>
-        <inertial pos="{leaning[0]!r} 0 {-leaning[1]!r}" mass="0.5"
+        <inertial pos="{leaning[0]!r} 0 {-leaning[1]!r}" mass="{weight!r}"
           diaginertia="{rest!r} {rest!r} {rest!r}"/></body>
       <body><joint name="output" type="hinge" axis="0 1 0" frictionloss="{p.output_dry!r}" {limit}/>
         <inertial pos="{place[0]!r} 0 {place[1]!r}" mass="{mass!r}"
