@@ -25,11 +25,10 @@ from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, at_present, fit, settled, sharpened
+from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
-from hdsim.estimate.refit import align, reweigh, with_delays
-from hdsim.estimate.state import State
+from hdsim.estimate.refit import align, reweigh, together, with_delays
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7
@@ -81,19 +80,23 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         if following is not None:
             found.fit = following
             continue
-        late = with_delays(bench, found.fit)
+        late = with_delays(bench, found.fit, rough=True)
         if late is None:
-            if found.named:
-                found.fit = settled(bench, found.fit)
-            return found
+            return _settled(bench, found)
         noise = sum(bench.noise_powers.values())
         left, now = (bench.power(each.predictions) - noise for each in (found.fit, late))
         found.fit = late
         if now > (1.0 - NEWS) * left or len(found.stages) == MOST_STAGES:
-            return found
+            return _settled(bench, found)
         # What a delay has blurred may show now.
         align(bench, found.fit)
         reweigh(bench, found.fit)
+
+
+def _settled(bench: Bench, found: Search) -> Search:
+    """The search's last fit carried on to its optimum, with the covariance there."""
+    found.fit = together(bench, found.fit)
+    return found
 
 
 def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Fit | None:
@@ -167,8 +170,8 @@ def _one_more(
     own = found.left.share(alone.columns).share * found.left.power
     named.beyond = float(np.clip(alone.share.share * left.power / own, 0.0, 1.0)) if own > 0 else 0.0
     named.gain = _gain(bench, base, current, named.fit)
-    least = BEYOND_GAIN if beyond else WITHIN_GAIN
-    return named if not found.named or named.gain >= least else None
+    least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
+    return named if named.gain >= least else None
 
 
 def beyond_curves(bench: Bench, current: Fit, left: Residual, named: Sequence[Named]) -> Residual:
@@ -195,11 +198,6 @@ def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
     first, last = (bench.channel_powers(each.predictions) for each in (base, now))
     noise = bench.noise_powers
     return any(last[c] - noise[c] >= BEYOND_GAIN * (first[c] - noise[c]) for c in first)
-
-
-def together(bench: Bench, found: Fit, state: State | None = None, *, rough: bool = False) -> Fit:
-    """All numbers fitted together: the base's and those of all effects; ``rough`` as in ``fit``."""
-    return fit(bench, state or found.state, at_present(found), prune=False, beside=found.beside, rough=rough)
 
 
 def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:

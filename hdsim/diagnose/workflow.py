@@ -15,7 +15,7 @@ from hdsim.diagnose.evidence import Evidence
 from hdsim.diagnose.name import Named
 from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.rules import RULES
-from hdsim.diagnose.search import Search, Stage, search, together
+from hdsim.diagnose.search import Search, Stage, search
 from hdsim.diagnose.verdict import Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
@@ -28,7 +28,7 @@ from hdsim.estimate.opening import bench_for, checked
 from hdsim.estimate.predict import LoadSource, PredictionError
 from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record
-from hdsim.estimate.refit import Refit, refit, tie
+from hdsim.estimate.refit import Refit, refit, tie, together
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, suspicions
 from hdsim.estimate.write import fitted_numbers

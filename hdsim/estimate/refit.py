@@ -101,14 +101,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         if reweigh(bench, found) < ALIKE:
             break
     found.undetermined, found.ties = undetermined, ties
-    if undetermined and found.frees:
-        unknown = Vector(found.state, tuple(undetermined), 0)
-        found.beside = sensitivities(bench, unknown, unknown.start(), found.predictions), unknown.priors()
-        rest = bench.stacked(bench.residuals(found.predictions))
-        priors = np.array([free.prior for free in found.frees])
-        found.covariance = robust_covariance(
-            found.columns, rest, bench.stacked_blocks(), priors, found.beside
-        )
+    _widened(bench, found)
     late = with_delays(bench, found)
     noise = sum(bench.noise_powers.values())
     left = bench.power(found.predictions) - noise
@@ -118,7 +111,37 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
 
 
-def with_delays(bench: Bench, found: Fit) -> Fit | None:
+def _widened(bench: Bench, found: Fit) -> None:
+    """Let the numbers that the data do not determine widen the intervals of the others."""
+    found.beside = None
+    if not found.undetermined or not found.columns.size:
+        return
+    unknown = Vector(found.state, tuple(found.undetermined), len(found.state.added))
+    found.beside = sensitivities(bench, unknown, unknown.start(), found.predictions), unknown.priors()
+    rest = bench.stacked(bench.residuals(found.predictions))
+    priors = Vector(found.state, tuple(found.frees), 0).priors()
+    found.covariance = robust_covariance(found.columns, rest, bench.stacked_blocks(), priors, found.beside)
+
+
+def together(bench: Bench, found: Fit, state: State | None = None, *, rough: bool = False) -> Fit:
+    """All numbers fitted together, the base's and those of all effects.
+
+    What the data did not determine while an effect was missing is asked again: it was drowned by that effect.
+
+    Args:
+        bench: the measured series.
+        found: the fit that is carried on.
+        state: the model, where it has other effects than the fit's.
+        rough: as in ``fit``.
+    """
+    frees = [*at_present(found), *found.undetermined]
+    whole = fit(bench, state or found.state, frees, rough=rough)
+    if not rough:
+        _widened(bench, whole)
+    return whole
+
+
+def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:
     """The model with the torques' delays free too; None where they are, or none can be.
 
     They come last: what is missing bends a delay as it bends any number, and a ripple hides behind one.
@@ -127,7 +150,8 @@ def with_delays(bench: Bench, found: Fit) -> Fit | None:
     free = delay_freedoms(found.state, bench.channels, period, load_known=bench.load_known)
     if not free or any(each.step for each in found.frees):
         return None
-    late = fit(bench, found.state, [*at_present(found), *free], prune=False, beside=found.beside)
+    frees = [*at_present(found), *free]
+    late = fit(bench, found.state, frees, prune=False, beside=found.beside, rough=rough)
     late.undetermined, late.ties = found.undetermined, found.ties
     return late
 
