@@ -52,7 +52,10 @@ def run_all(given: argparse.Namespace) -> None:
         except AbsentError as missing:
             print(f"skipped: {missing}")
             continue
-        wanted += [Task(name, n, seed) for seed in numbers_of(given.seed) for n in numbers_of(given.numbers)]
+        most, numbers = given.most_samples, numbers_of(given.numbers)
+        wanted += [Task(name, n, seed, most) for seed in numbers_of(given.seed) for n in numbers]
+    # Families in turn, so that a part of the run has all of them.
+    wanted.sort(key=lambda task: (task.seed, task.number))
     given.results.parent.mkdir(parents=True, exist_ok=True)
     known = {Task(r["family"], r["number"], r["seed"]) for r in lines_of([given.results])}
     todo = [task for task in wanted if task not in known]
@@ -124,6 +127,8 @@ def main() -> None:
         "--seed", default="1", help="even: calibration, odd: statement; several as for --numbers"
     )
     command.add_argument("--jobs", type=int, default=1, help="processes")
+    command.add_argument("--most-samples", type=int, default=10**9, metavar="N",
+                         help="leave out cases whose records hold more samples together")  # fmt: skip
     command.add_argument("--results", type=Path, default=Path("results/blind.jsonl"),
                          help="JSON-lines file: cases in it are not run again")  # fmt: skip
     command.set_defaults(run=run_all)

@@ -10,7 +10,7 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -33,6 +33,7 @@ class Task:
     family: str
     number: int
     seed: int
+    most_samples: int = field(default=10**9, compare=False)
 
 
 def task_of(key: str) -> Task:
@@ -87,6 +88,9 @@ def attempt(task: Task) -> Line:
         "strength": [float(s) for s in case.strength], "setup": case.setup,
         "made_cpu_s": round(time.process_time() - started, 2),
     }  # fmt: skip
+    samples = sum(len(record.time) for record in (*case.records, *case.holdout))
+    if samples > task.most_samples:
+        raise AbsentError(f"{case.key}: {samples} samples, more than {task.most_samples}")
     if case.without is not None:
         line["without"] = _without(case.without)
     return line | _diagnosed(case)
