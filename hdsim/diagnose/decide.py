@@ -123,6 +123,13 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
         ("held-out data show the promised change", evidence.held.slope, min(held, 0.0) if k else held),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
+    found.append(
+        (
+            "part of the structure in its own coordinate that it leaves",
+            law.own_left,
+            (rules.own_left_exact if law.exact else rules.own_left) * law.own_left,
+        )
+    )
     if law.at_limit:
         found.append(("a number stands at the end of its range", 1.0, rules.limit))
     if k > 0:

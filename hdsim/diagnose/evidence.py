@@ -77,6 +77,8 @@ class LawEvidence(Part):
     """Part of what its trace explains that no smooth curve over the others' coordinates can."""
     own_left: float = 0.0
     """Structure left in its own coordinate, as a part of what was there at first."""
+    exact: bool = False
+    """Whether its formula is exact, as statics are, and may leave nothing there."""
     at_limit: bool = False
     """Whether one of its numbers stands at the end of its range."""
 

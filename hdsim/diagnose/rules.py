@@ -38,6 +38,12 @@ class Rules(Part):
     sampled: float = _rule(
         0.3, "log odds per log odds", "weight of the share of resampled records won", "chosen"
     )
+    own_left: float = _rule(
+        -1.0, "log odds", "for all of the structure in its own coordinate left by a formula", "chosen"
+    )
+    own_left_exact: float = _rule(
+        -8.0, "log odds", "the same for an exact one: a cable over the output is no unbalance", "chosen"
+    )
     limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
     later: float = _rule(-1.0, "log odds", "for each effect beside the first", "chosen")
     beyond: float = _rule(

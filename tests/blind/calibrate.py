@@ -19,8 +19,21 @@ from hdsim.diagnose.evidence import Evidence
 from hdsim.diagnose.rules import RULES, Rules
 
 #: Weights that are fitted, in the order in which ``weighed`` uses them, and their prior's standard deviation.
-WEIGHTS = ("odds", "explained", "held", "sampled", "limit", "later", "beyond", "gain")
+WEIGHTS = (
+    "odds",
+    "explained",
+    "held",
+    "sampled",
+    "own_left",
+    "own_left_exact",
+    "limit",
+    "later",
+    "beyond",
+    "gain",
+)
 SPREAD = 1.0
+#: Those that can only speak against a name.
+AGAINST = ("own_left", "own_left_exact", "limit", "later")
 
 
 def examples(lines: Sequence[Line]) -> tuple[np.ndarray, np.ndarray]:
@@ -57,8 +70,10 @@ def fitted(x: np.ndarray, right: np.ndarray) -> np.ndarray:
         return float(np.logaddexp(0.0, -sign * (x @ w)).sum() + 0.5 * np.sum(((w - prior) / SPREAD) ** 2))
 
     # What more is explained, won or shown can never speak against a name.
-    lower = [None if name in ("odds", "limit", "later") else 0.0 for name in WEIGHTS]
-    upper = [0.0 if name in ("limit", "later") else None for name in WEIGHTS]
+    lower = [None if name in ("odds", *AGAINST) else 0.0 for name in WEIGHTS]
+        None if name in ("odds", "own_left", "own_left_exact", "limit", "later") else 0.0 for name in WEIGHTS
+    ]
+    upper = [0.0 if name in AGAINST else None for name in WEIGHTS]
     return np.asarray(minimize(loss, prior, bounds=list(zip(lower, upper, strict=True))).x)
 
 
