@@ -71,8 +71,6 @@ def fitted(x: np.ndarray, right: np.ndarray) -> np.ndarray:
 
     # What more is explained, won or shown can never speak against a name.
     lower = [None if name in ("odds", *AGAINST) else 0.0 for name in WEIGHTS]
-        None if name in ("odds", "own_left", "own_left_exact", "limit", "later") else 0.0 for name in WEIGHTS
-    ]
     upper = [0.0 if name in AGAINST else None for name in WEIGHTS]
     return np.asarray(minimize(loss, prior, bounds=list(zip(lower, upper, strict=True))).x)
 
