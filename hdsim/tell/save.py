@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Findings | None = None) -> Path:
-    """Write ``verdict.json``, the scenario, the figures, the log and the report; returns the report's path.
+    """Write ``verdict.json``, ``evidence.json``, scenario, figures, log and report; returns the report's path.
 
     Args:
         diagnosis: what was found.
@@ -44,5 +44,7 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Finding
             (stage / "next.yaml").write_text(experiment, encoding="utf-8")
         write_compared(diagnosis, stage)
         (stage / "verdict.json").write_text(verdict.model_dump_json(indent=2), encoding="utf-8")
+        evidence = diagnosis.evidence.model_dump_json(indent=2)
+        (stage / "evidence.json").write_text(evidence, encoding="utf-8")
         report = write_report(found or gather(diagnosis), stage)
     return out / report.name

@@ -1,5 +1,7 @@
 """Noise of channels: white, quantised, and what falls out of the difference of two encoders."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +12,7 @@ from hdsim.estimate.noise import noise_floor, quantisation_step
 from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
 
+JOINT = Path(__file__).parents[3] / "shared" / "data" / "lara8-joint3-dual-encoder" / "joint3.csv"
 ALL = np.ones(6000, dtype=bool)
 
 
@@ -85,3 +88,18 @@ def test_held_out_records_are_weighed_as_their_channel():
     bench.weigh([np.tile([1e-4, -1e-4], 2000), rest[1]])
     learnt, held = (s.sigma for s in bench.series)
     assert held == pytest.approx(learnt, rel=0.2)
+
+
+@pytest.mark.skipif(not JOINT.exists(), reason="the recording is not here")
+def test_a_real_joint_with_two_encoders_is_compared_by_its_transmission_error():
+    """NEURA LARA8, joint 3: each angle has 32 arcsec of noise from the clock, their difference 5.3."""
+    log = np.genfromtxt(JOINT, delimiter=",", names=True)
+    turn = 2.0 * np.pi / 2**24
+    angles = {f"{side}_angle": log[f"encoder_{side[:5].replace('outpu', 'load')}inc_3"] * turn
+              for side in ("motor", "output")}  # fmt: skip
+    record = Record("joint 3", log["Timestamp"] - log["Timestamp"][0], angles)
+    alone = noise_floor(angles["output_angle"], np.ones(len(log), dtype=bool))
+    _, _, noise = Predictor(record, plan_for(record), 101.0).measured("output_angle")
+    arcsec = np.degrees(1.0) * 3600.0
+    assert alone * arcsec == pytest.approx(32.0, rel=0.1)
+    assert noise * arcsec < 5.5
