@@ -42,6 +42,9 @@ WORDINGS = {
         "one of its numbers stands at the end of its range", lambda _: "yes"
     ),
     "one more effect": Wording("not the first: a further effect", lambda k: f"no. {k + 1:.0f}"),
+    "part of what a channel lacked that it explains": Wording(
+        "part of what was missing in a channel at first that it explains", _part
+    ),
     "what it explains beyond smooth curves over the others' coordinates": Wording(
         "part of it that no smooth curve of the other effects can stand in for", _part
     ),

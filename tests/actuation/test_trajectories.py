@@ -392,7 +392,7 @@ def test_a_missing_or_binary_file_is_refused(tmp_path):
 
 
 def test_pieces_of_any_spacing_are_found_as_by_a_plain_search():
-    """Against SciPy's piecewise polynomials, at and beside every knot: even, clustered, random and few ones."""
+    """Against SciPy's piecewise polynomials, at and beside every knot: even, clustered, random and few."""
     from scipy.interpolate import CubicSpline
 
     rng = np.random.default_rng(4)

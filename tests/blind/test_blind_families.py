@@ -11,9 +11,9 @@ from drawing import RATES, SENSORS, draw_drive, draw_lengths, draw_sensing, visi
 from moving import MOTIONS, motion
 from toothed_plant import Teeth
 
-from hdsim.estimate.freedom import state_of
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record
+from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 
 #: Root-mean-square of what the base leaves over the noise, quantisation included: nothing, or a little.

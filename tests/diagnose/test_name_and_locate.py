@@ -13,7 +13,7 @@ from hdsim.diagnose.workflow import diagnose
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.predict import predictors
-from hdsim.estimate.prove import kept
+from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Record
 from hdsim.tell.save import save
 
@@ -70,7 +70,9 @@ def test_a_hidden_effect_is_named_added_and_closes_the_gap(tmp_path, hidden, nam
         list((tmp_path / "out").glob("*.png"))
     )
     written = Verdict.model_validate(json.loads((tmp_path / "out" / "verdict.json").read_text()))
-    assert written.version == 1
+    assert written.version == 2
+    assert written.confidence == pytest.approx(verdict.effects[0].confidence)
+    assert [reason.rule for reason in written.because] == [reason.rule for reason in verdict.because] != []
     again = hdsim.load_scenario(written.scenario)
     assert name in again.effects.active()
     # The scenario that was written leaves nothing of the same record to name.
@@ -122,8 +124,26 @@ def test_held_out_data_bear_out_the_part_of_a_change_that_is_there(tmp_path, the
     wave = np.sin(np.arange(len(series.measured)))
     prediction = series.measured + 3.0
     found = {"refit": [prediction - there * wave], "after": [prediction + (1.0 - there) * wave]}
-    # |t w|^2 - |(t - 1) w|^2 = (2 t - 1) |w|^2
-    assert kept(bench, found) == pytest.approx(2.0 * there - 1.0, abs=0.02)
+    slope, spread = borne_out(bench, found)
+    assert slope == pytest.approx(there, abs=0.01)
+    assert spread < 0.01
+
+
+def test_held_out_data_say_how_surely_they_bear_a_change_out(tmp_path):
+    bench = Bench(predictors([rigid_record(30.0, noise=0.0)], -100.0))
+    (series,) = bench.series
+    rng = np.random.default_rng(8)
+    samples = len(series.measured)
+    wave = np.sin(np.arange(samples))
+    slopes, spreads = [], []
+    for _ in range(200):
+        prediction = series.measured + 2.0 * rng.standard_normal(samples)
+        slope, spread = borne_out(bench, {"refit": [prediction - wave], "after": [prediction]})
+        slopes.append(slope)
+        spreads.append(spread)
+    assert np.mean(slopes) == pytest.approx(1.0, abs=4 * np.std(slopes) / np.sqrt(200))
+    assert np.mean(spreads) == pytest.approx(np.std(slopes), rel=0.2)
+    assert borne_out(bench, {"refit": [series.measured], "after": [series.measured]}) == (1.0, np.inf)
 
 
 def test_of_two_that_explain_the_same_the_simpler_one_has_the_name():

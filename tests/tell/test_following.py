@@ -3,6 +3,8 @@
 import html
 from dataclasses import replace
 
+import pytest
+
 import hdsim
 from hdsim.diagnose.verdict import Verdict
 from hdsim.tell.following import NOTHING, candidates
@@ -34,6 +36,14 @@ def test_only_what_the_data_leave_open_is_to_be_measured_again(diagnosis):
     assert candidates(diagnosis) == {}
     unlikely = diagnosis.verdict.effects[0].model_copy(update={"confidence": 0.6})
     weak = diagnosis.verdict.model_copy(update={"effects": [unlikely]})
-    assert candidates(replace(diagnosis, verdict=weak)) == {own.name: own.fit, NOTHING: diagnosis.refit.fit}
+    found = candidates(replace(diagnosis, verdict=weak))
+    assert list(found) == [own.name, NOTHING]
+    assert found[NOTHING] is diagnosis.refit.fit
+    bench = diagnosis.bench
+    # The effect's fit, carried on to its very end.
+    settled = found[own.name]
+    assert [added.effect for added in settled.state.added] == [own.name]
+    assert settled.state.added[0].coefficients == pytest.approx(own.fit.state.added[0].coefficients, rel=0.01)
+    assert bench.power(settled.predictions) <= bench.power(own.fit.predictions) * (1 + 1e-6)
     silent = weak.model_copy(update={"verdict": "nothing"})
     assert candidates(replace(diagnosis, verdict=silent)) == {}
