@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Findings | None = None) -> Path:
-    """Write ``verdict.json``, ``evidence.json``, scenario, figures, log and report; returns the report's path.
+    """Write ``verdict.json``, ``evidence.json``, scenario, figures, log, report; returns the report's path.
 
     Args:
         diagnosis: what was found.
