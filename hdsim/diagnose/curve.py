@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hdsim.diagnose.coordinates import coordinates, hats
 from hdsim.diagnose.further import CurveFound
-from hdsim.diagnose.locate import Location, coordinates, hats
+from hdsim.diagnose.locate import Location
 from hdsim.diagnose.penalised import UNSEEN, Penalised, penalised, roughness
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.search import left_of

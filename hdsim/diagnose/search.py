@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdsim.diagnose.locate import Line, Location, curves_over, locate, order_lines
+from hdsim.diagnose.locate import Location, curves_over, locate
 from hdsim.diagnose.name import (
     LEAST_SHARE,
     LEVEL,
@@ -21,6 +21,7 @@ from hdsim.diagnose.name import (
     Named,
     name_effect,
 )
+from hdsim.diagnose.orders import Line, order_lines
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue

@@ -12,7 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from hdsim.diagnose.locate import Line, Place
+from hdsim.diagnose.locate import Place
+from hdsim.diagnose.orders import Line
 from hdsim.diagnose.screen import Residual, Share, chance_of
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import WIDER, Fitting
