@@ -102,12 +102,21 @@ def _basis(at: Array, period: float | None, x: Array) -> Array:
 def solved(
     bench: Bench, fit: Fit, left: Residual, at: Array, added: Added, columns: Array, found: Penalised
 ) -> tuple[Fit, Array]:
-    """The model with the curve, and the standard deviations of its coefficients.
+    """The model with the curve, and the standard deviations of its coefficients, shape (k,).
 
     The traces stay those of the start (a chord method): a second step takes up what is not linear in them.
     The variances are the sum of two: that of the Bayesian view of the penalty, which covers the smoothing's
     bias (Nychka 1988, J. American Statistical Association 83:1134), and the cluster-robust one over blocks of
     time, which covers residuals that are correlated.
+
+    Args:
+        bench: the measured series.
+        fit: the fitted model without the curve.
+        left: what it leaves, without what its own numbers and the sensors' offsets explain.
+        at: corners, shape (k,), SI unit of the coordinate.
+        added: the curve as an effect with one coefficient for each corner.
+        columns: its ``unit_traces``, shape (rows, k).
+        found: penalised least squares of ``left`` over them.
     """
     projected = left.project(columns)
     blocks = bench.stacked_blocks()

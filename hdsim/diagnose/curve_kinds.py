@@ -107,7 +107,15 @@ def kinds(bench: Bench, location: Location) -> list[Kind]:
 
 
 def values_of(bench: Bench, state: State, kind: Kind, index: int, residuals: Sequence[Array]) -> Array | None:
-    """The coordinate of a curve at all samples of a series, shape (n,)."""
+    """The coordinate of a curve at all samples of a series, shape (n,), SI unit; None where nothing tells it.
+
+    Args:
+        bench: the measured series.
+        state: the model, whose spring tells the twist.
+        kind: the curve.
+        index: number of the series.
+        residuals: of all series; they say what torque the model has.
+    """
     series = bench.series[index]
     predictor = bench.predictors[series.record]
     if kind.coordinate == "motor_angle":
