@@ -34,7 +34,7 @@ def separated(
     noise: Mapping[str, float],
     density: float,
 ) -> tuple[float, str, float, float]:
-    """How far the records of two models are apart, once the second one's numbers have moved towards the first.
+    """How far two models' records are apart, once the second one's numbers have moved towards the first.
 
     Args:
         truth: channels of the first model's record, by name, shape (n,) each, SI units.

@@ -4,8 +4,8 @@ import html
 from dataclasses import replace
 
 import hdsim
+from hdsim.diagnose.following import NOTHING, candidates
 from hdsim.diagnose.verdict import Verdict
-from hdsim.tell.following import NOTHING, candidates
 from hdsim.tell.save import save
 
 
