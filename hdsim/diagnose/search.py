@@ -30,6 +30,7 @@ from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import align, reweigh, together, with_delays
+from hdsim.estimate.unwound import unwound
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7
@@ -268,8 +269,8 @@ def left_of(bench: Bench, current: Fit) -> Residual:
     """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
     numbers = bench.stacked_series()
     offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
-    unwound = [column[:, None] for column in bench.unwound(current.state, current.predictions).values()]
+    zeros = [column[:, None] for column in unwound(bench, current.state, current.predictions).values()]
     # A delay of a few samples takes little, but without its bounds it would take all that lags.
     own = [k for k in range(current.columns.shape[1]) if k >= len(current.frees) or not current.frees[k].step]
-    columns: Array = np.hstack([current.columns[:, own], offsets, *unwound])
+    columns: Array = np.hstack([current.columns[:, own], offsets, *zeros])
     return Residual(bench.stacked(bench.residuals(current.predictions)), columns, bench.stacked_blocks())
