@@ -1,15 +1,6 @@
 """Step 9, next experiment: which scenario would separate candidates that the data cannot tell apart.
 
-Every scenario is simulated under every candidate. What separates two of them is the part of the difference
-of their records that no re-fit of either takes away, in standard deviations of the noise: with S the
-sensitivities to the numbers of the one that is fitted and C their covariance after the first data, and the
-difference D and S divided by the noise,
-
-    d'^2 = D^T (1 + S C S^T)^-1 D
-
-(Wald's distance of two Gaussian predictions; Box and Hill 1967, Technometrics 9:57, choose experiments for
-telling models apart by it). Noise is what the best candidate leaves of the measured channels, counted by its
-independent samples.
+Every scenario is simulated under every candidate; ``hdsim.diagnose.separation`` says how far apart they are.
 """
 
 from __future__ import annotations
@@ -27,9 +18,9 @@ import numpy as np
 
 from hdsim.diagnose.experiments import Experiment, experiments, limits_of
 from hdsim.diagnose.further import Candidate, NextExperiment
+from hdsim.diagnose.separation import noise_of, separated
 from hdsim.errors import InputError
 from hdsim.estimate.bench import THREADS, Bench
-from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import LEAD_IN_S
 from hdsim.estimate.records import CHANNELS, Array
@@ -148,17 +139,6 @@ def scenario_text(experiment: Experiment, extends: str, sentence: str, rate_hz: 
     return to_yaml(data)
 
 
-def noise_of(bench: Bench, fit: Fit) -> dict[str, float]:
-    """Standard deviation that one independent sample of each channel would have, from what a fit leaves."""
-    found: dict[str, list[float]] = {}
-    for series, rest in zip(bench.series, bench.residuals(fit.predictions), strict=True):
-        rows = series.train
-        if len(rest) and rows.any():
-            power = float(np.mean(rest[rows] ** 2)) * correlation(rest[rows], series.block[rows])
-            found.setdefault(series.channel, []).append(max(power, series.noise**2, 1e-30))
-    return {channel: math.sqrt(float(np.mean(powers))) for channel, powers in found.items()}
-
-
 def _rate(bench: Bench) -> float:
     return 1.0 / bench.predictors[0].record.period_s
 
@@ -217,7 +197,7 @@ def _outcomes(bench: Bench, tried: Sequence[Experiment], fits: Mapping[str, Fit]
         outcome = None
         for pair in combinations(fits, 2):
             for truth, fitted in (pair, pair[::-1]):
-                seen = _separated(
+                seen = separated(
                     records[truth], records[fitted], slopes[fitted], steps[fitted], roots[fitted],
                     noise, _rate(bench) / rate,
                 )  # fmt: skip
@@ -299,55 +279,6 @@ def _simulated(
         values = np.asarray(got[source])[later]
         found[channel] = state.reading(channel, np.asarray(got.time)[later], values)
     return found
-
-
-def _separated(
-    truth: Any,
-    fitted: Any,
-    slopes: Sequence[Any],
-    steps: Sequence[float],
-    spread: Array,
-    noise: Mapping[str, float],
-    density: float,
-) -> tuple[float, str, float, float]:
-    """d', the channel that holds most of its square, the largest difference there (SI), and its sample.
-
-    ``spread`` is a root of the covariance of the numbers that the slopes belong to.
-    """
-    weights = {channel: math.sqrt(density) / noise[channel] for channel in truth}
-
-    def stacked(there: Any, here: Any) -> Array:
-        parts = []
-        for channel, weight in weights.items():
-            change = there[channel] - here[channel]
-            parts.append(weight * (change - change.mean()))
-        return np.concatenate(parts)
-
-    difference = stacked(truth, fitted)
-    if slopes:
-        columns = np.column_stack(
-            [stacked(slope, fitted) / step for slope, step in zip(slopes, steps, strict=True)]
-        )
-        root = columns @ spread
-        inner = np.eye(root.shape[1]) + root.T @ root
-        # What is left of the difference once the numbers have moved as far as both data let them.
-        taken = np.linalg.solve(inner, root.T @ difference)
-        squared = float(difference @ difference - difference @ root @ taken)
-        rest = difference - root @ taken
-    else:
-        squared, rest = float(difference @ difference), difference
-    best, at = ("", 0.0, 0), 0
-    largest = -math.inf
-    for channel, weight in weights.items():
-        n = len(truth[channel])
-        part = difference[at : at + n]
-        share = float(part @ rest[at : at + n])
-        if share > largest:
-            largest = share
-            k = int(np.argmax(np.abs(part)))
-            best = (channel, float(abs(part[k]) / weight), k)
-        at += n
-    return math.sqrt(max(squared, 0.0)), best[0], best[1], float(best[2])
 
 
 def _said(separation: float) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdsim.diagnose.locate import Line, Location, curves_over, locate, order_lines
+from hdsim.diagnose.locate import Location, curves_over, locate
 from hdsim.diagnose.name import (
     LEAST_SHARE,
     LEVEL,
@@ -21,6 +21,7 @@ from hdsim.diagnose.name import (
     Named,
     name_effect,
 )
+from hdsim.diagnose.orders import Line, order_lines
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
@@ -29,6 +30,7 @@ from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import align, reweigh, together, with_delays
+from hdsim.estimate.unwound import unwound
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7
@@ -267,8 +269,8 @@ def left_of(bench: Bench, current: Fit) -> Residual:
     """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
     numbers = bench.stacked_series()
     offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
-    unwound = [column[:, None] for column in bench.unwound(current.state, current.predictions).values()]
+    zeros = [column[:, None] for column in unwound(bench, current.state, current.predictions).values()]
     # A delay of a few samples takes little, but without its bounds it would take all that lags.
     own = [k for k in range(current.columns.shape[1]) if k >= len(current.frees) or not current.frees[k].step]
-    columns: Array = np.hstack([current.columns[:, own], offsets, *unwound])
+    columns: Array = np.hstack([current.columns[:, own], offsets, *zeros])
     return Residual(bench.stacked(bench.residuals(current.predictions)), columns, bench.stacked_blocks())

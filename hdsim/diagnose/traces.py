@@ -8,21 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
 
-from hdsim.diagnose.locate import Line, Place
+from hdsim.diagnose.locate import Place
+from hdsim.diagnose.orders import Line
 from hdsim.diagnose.screen import Residual, Share, chance_of
+from hdsim.diagnose.starts import neighbours, starts
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import WIDER, Fitting
+from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.predict import CARRIED, PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State, number_at
 
-#: Orders of a periodic term that are taken from the spectra.
-MOST_ORDERS = 3
 #: Starts that are many, and the share of a channel below which nothing lives in a coordinate.
 MANY, TRACELESS = 6, 2e-3
 #: Times that the shapes of the effects that explain most are refined, and the part of the best share for it.
@@ -157,7 +156,7 @@ def screen(
     for times in range(REFINED):
         most = max((one.share.share for one in kinds.values()), default=0.0)
         worth = [one for one in kinds.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
-        look([added for one in worth for added in _neighbours(one.added, times)], first=False)
+        look([added for one in worth for added in neighbours(one.added, times)], first=False)
     best: dict[str, Screened] = {}
     for one in sorted(kinds.values(), key=lambda one: -one.share.share):
         first = best.setdefault(one.name, one)
@@ -211,51 +210,9 @@ def ranked_anew(screening: Screening, residual: Residual) -> Screening:
     return found
 
 
-def starts(name: str, fitting: Fitting, lines: Sequence[Line], ranges: Mapping[str, float]) -> list[Added]:
-    """The effect at unit size with every combination of its shapes' starts.
-
-    Args:
-        name: of the effect.
-        fitting: how it is fitted.
-        lines: peaks of the order spectra, for its periodic terms.
-        ranges: what the records cover, for units that are parts of it.
-
-    Returns:
-        Nothing when the record does not give what the fitting asks for.
-    """
-    own = fitting.within(ranges)
-    if own is None:
-        return []
-    orders: tuple[float, ...] = ()
-    peaks = [(line.channel, line.order) for line in lines]
-    for term in own.terms:
-        read = term.orders_among(peaks, MOST_ORDERS)
-        if read is None:
-            return []
-        orders = read or orders
-    return [
-        Added(name, own, (1.0,) * own.count(orders), tuple(values), orders)
-        for values in product(*(shape.starts for shape in own.shapes))
-    ]
-
-
 def _home(name: str) -> str:
     """The coordinate in which an effect shows most."""
     return catalogue()[name].signature.lives_in[0]
-
-
-def _neighbours(added: Added, times: int) -> list[Added]:
-    """The effect at unit size with each shape, or the width of its play, a little off on either side."""
-    found = []
-    if added.fitting.play:
-        for factor in (WIDER ** (-(0.5 ** (times + 1))), WIDER ** (0.5 ** (times + 1))):
-            units = (1.0,) * len(added.coefficients)
-            found.append(replace(added, fitting=added.fitting.rescaled(factor), coefficients=units))
-    for k, shape in enumerate(added.fitting.shapes):
-        for value in shape.neighbours(added.shapes[k], times):
-            shapes = (*added.shapes[:k], value, *added.shapes[k + 1 :])
-            found.append(replace(added, coefficients=(1.0,) * len(added.coefficients), shapes=shapes))
-    return found
 
 
 def behind_sensor(

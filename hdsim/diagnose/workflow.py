@@ -20,7 +20,7 @@ from hdsim.diagnose.verdict import Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.check import Check
+from hdsim.estimate.data_problems import Check
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.estimate.numbers import Interval

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from hdsim.effects._periodic import Periodic
 from hdsim.effects._plausible import Plausible, Range, range_of, scales_of
 from hdsim.effects._terms import (
     INSIDE,
@@ -20,7 +21,6 @@ from hdsim.effects._terms import (
     Harmonic,
     Inverse,
     Limits,
-    Periodic,
     Ranged,
     Term,
 )

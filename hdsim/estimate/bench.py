@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 #: Models that are simulated at the same time, in threads: the compiled solver lets go of the interpreter.
 THREADS = min(4, os.cpu_count() or 1)
 
-#: Prior spread of the angle at which a locked drive carries nothing, as a part of the motor's travel, and the
-#: number of samples that together tell as much as one independent one.
-TURN, SAMPLES_A_FACT = 0.05, 50.0
 #: Aimed length of a block, s, and the least and most blocks of a record.
 BLOCK_S = 0.25
 FEWEST_BLOCKS, MOST_BLOCKS = 18, 90
@@ -151,53 +148,6 @@ class Bench:
     def turns(self) -> float:
         """Longest travel of the wave generator in a training record, turns."""
         return max(float(np.ptp(p.motor_angle)) for p in self.predictors[: self.training]) / (2 * np.pi)
-
-    def align(self, state: State, predictions: Sequence[Array]) -> bool:
-        """Where the output is locked, find the encoder's angle at which the drive carries nothing.
-
-        Args:
-            state: a fitted model.
-            predictions: what it predicts now.
-
-        Returns:
-            Whether a record was moved, so that predictions have to be made anew.
-        """
-        columns = self.unwound(state, predictions)
-        if not columns:
-            return False
-        rest = self.stacked(self.residuals(predictions))
-        ranges = [float(np.ptp(self.predictors[index].motor_angle)) for index in columns]
-        # A linear spring does not tell the angle, as offsets are taken out: it then stays where it is.
-        priors = TURN * np.array(ranges)
-        design = np.column_stack(list(columns.values())) * priors
-        ridge = SAMPLES_A_FACT * float(np.mean(rest**2)) * np.eye(len(priors))
-        steps = priors * np.clip(np.linalg.solve(design.T @ design + ridge, design.T @ rest), -2.0, 2.0)
-        for index, step in zip(columns, steps, strict=True):
-            self.predictors[index].turn(float(step))
-        return True
-
-    def unwound(self, state: State, predictions: Sequence[Array]) -> dict[int, Array]:
-        """Change of the whitened predictions per rad of motor angle at zero torque, by locked record."""
-        found: dict[int, Array] = {}
-        candidate = state.candidate()
-        for index, predictor in enumerate(self.predictors[: self.training]):
-            if not predictor.plan.locked:
-                continue
-            step = 1e-3 * max(float(np.ptp(predictor.motor_angle)), 1e-6)
-            predictor.turn(step)
-            there = predictor.predict(candidate)
-            predictor.turn(-step)
-            changed = [
-                state.reading(s.channel, predictor.record.time, there[s.channel])
-                for s in self.series
-                if s.record == index
-            ]
-            own = iter(changed)
-            moved = [
-                next(own) if s.record == index else p for s, p in zip(self.series, predictions, strict=True)
-            ]
-            found[index] = self.trace(predictions, moved) / step
-        return found
 
     def trace(self, base: Sequence[Array], there: Sequence[Array]) -> Array:
         """Whitened difference of two sets of predictions, offsets removed, shape (rows,)."""

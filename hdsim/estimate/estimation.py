@@ -10,8 +10,8 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.check import Problem
 from hdsim.estimate.covariance import correlation
+from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.determine import UNDETERMINED
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.found import Gap

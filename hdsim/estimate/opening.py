@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.check import Check, check_record
+from hdsim.estimate.check import check_record
+from hdsim.estimate.data_problems import Check
 from hdsim.estimate.predict import LoadSource, Locked, predictors
 from hdsim.estimate.records import Record, record_from
 

@@ -14,6 +14,7 @@ from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
+from hdsim.estimate.unwound import turn_to_zero
 from hdsim.estimate.vector import Vector, sensitivities
 
 #: Part of what the number that can do most alone can do, for another to do as well.
@@ -158,7 +159,7 @@ def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:
 
 def align(bench: Bench, found: Fit) -> None:
     """Turn locked records to where the fitted model carries nothing."""
-    if bench.align(found.state, found.predictions):
+    if turn_to_zero(bench, found.state, found.predictions):
         found.predictions = bench.predict(found.state)
 
 

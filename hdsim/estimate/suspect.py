@@ -1,6 +1,6 @@
 """Suspicions that need the model: wrong scales, and logs of another drive, before either is sold as physics.
 
-Kinematics tell a wrong unit only where two channels show the same motion (`hdsim.estimate.check`). A torque
+Kinematics tell a wrong unit only where two channels show the same motion (`hdsim.estimate.factors`). A torque
 that stands alone is held against the model: its regression on the prediction gives one factor, and a factor
 near 1000, 180/pi, the ratio or -1 has a likely cause. The re-fitted numbers are held against the range in
 which a drive of the same size lies.
@@ -14,7 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.check import Problem, explain, slope
+from hdsim.estimate.data_problems import Problem
+from hdsim.estimate.factors import explain, slope
 from hdsim.estimate.numbers import Interval
 from hdsim.estimate.predict import Predictor
 from hdsim.estimate.records import Array, Mask

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hdsim.diagnose.coordinates import coordinates
 from hdsim.diagnose.evidence import Evidence, PlaceEvidence, StageEvidence
-from hdsim.diagnose.locate import Line, coordinates, order_lines
+from hdsim.diagnose.orders import Line, order_lines
 from hdsim.diagnose.rules import RULES
 from hdsim.diagnose.verdict import Remainder, Verdict
 from hdsim.diagnose.workflow import LEAST_REST

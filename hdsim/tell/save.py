@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hdsim.diagnose.following import next_experiment
 from hdsim.estimate.write import scenario_text
 from hdsim.tell.findings import Findings, gather
-from hdsim.tell.following import next_experiment
 from hdsim.tell.record_out import write_compared
 from hdsim.tell.report import write_report
 from hdsim.tell.staging import staged
+from hdsim.tell.words import title_of
 
 if TYPE_CHECKING:
     from hdsim.diagnose.workflow import Diagnosis
@@ -39,7 +40,7 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Finding
             text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
             (stage / "found.yaml").write_text(text, encoding="utf-8")
             verdict.scenario = str(out / "found.yaml")
-        experiment = next_experiment(diagnosis, Path(base), out)
+        experiment = next_experiment(diagnosis, Path(base), out, title_of)
         if experiment is not None:
             (stage / "next.yaml").write_text(experiment, encoding="utf-8")
         write_compared(diagnosis, stage)

@@ -127,7 +127,7 @@ def unit_of(gap: Gap) -> units.Unit:
 
 
 def title_of(name: str) -> str:
-    """The field's term for an effect of the catalogue."""
+    """The field's term for an effect of the catalogue; any other name is spoken."""
     from hdsim.effects import catalogue
 
     known = catalogue()

@@ -4,8 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hdsim.errors import InputError
-from hdsim.estimate.check import check_record, explain, find_spikes, noise_floor
+from hdsim.estimate.check import check_record
+from hdsim.estimate.factors import explain
+from hdsim.estimate.noise import noise_floor
 from hdsim.estimate.records import Record, record_from
+from hdsim.estimate.spikes import find_spikes
 from hdsim.recording import Column, Recording, Table
 
 RATIO = -100.0

@@ -8,7 +8,9 @@ import pytest
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.curve import Kind, effect, fit_curve, unit_traces
+from hdsim.diagnose.curve import fit_curve
+from hdsim.diagnose.curve_fit import effect, unit_traces
+from hdsim.diagnose.curve_kinds import Kind
 from hdsim.diagnose.locate import Location, locate
 from hdsim.diagnose.penalised import penalised, roughness
 from hdsim.diagnose.screen import Residual

@@ -8,8 +8,9 @@ from diagnose_bench import BASE
 from ruamel.yaml import YAML
 
 import hdsim
-from hdsim.diagnose.experiment import _separated, propose
+from hdsim.diagnose.experiment import propose
 from hdsim.diagnose.experiments import Limits, experiments
+from hdsim.diagnose.separation import separated
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
@@ -153,10 +154,10 @@ def test_the_distance_is_that_of_two_gaussian_predictions():
     columns = np.column_stack([stacked(slope, fitted) / 0.5 for slope in slopes])
     total = np.eye(2 * n) + columns @ (root @ root.T) @ columns.T
     wanted = np.sqrt(difference @ np.linalg.solve(total, difference))
-    found = _separated(truth, fitted, slopes, [0.5] * p, root, noise, 2.5)
+    found = separated(truth, fitted, slopes, [0.5] * p, root, noise, 2.5)
     assert found[0] == pytest.approx(wanted, rel=1e-9)
     # Numbers that may move anywhere take their whole direction away.
-    free = _separated(truth, fitted, slopes, [0.5] * p, 1e6 * np.eye(p), noise, 2.5)
+    free = separated(truth, fitted, slopes, [0.5] * p, 1e6 * np.eye(p), noise, 2.5)
     rest = difference - columns @ np.linalg.lstsq(columns, difference, rcond=None)[0]
     assert free[0] == pytest.approx(np.linalg.norm(rest), rel=1e-6)
 

@@ -6,8 +6,8 @@ import pytest
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.locate import order_lines
 from hdsim.diagnose.name import simplest_first
+from hdsim.diagnose.orders import order_lines
 from hdsim.diagnose.verdict import Verdict
 from hdsim.diagnose.workflow import diagnose
 from hdsim.errors import InputError

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from hdsim.diagnose.experiment import propose
+from hdsim.diagnose.workflow import Diagnosis
 from hdsim.errors import InputError
-from hdsim.estimate.fit import settled
-from hdsim.tell.words import title_of
-
-if TYPE_CHECKING:
-    from hdsim.diagnose.workflow import Diagnosis
-    from hdsim.estimate.fit import Fit
+from hdsim.estimate.fit import Fit, settled
 
 #: Probability to be right below which a name is weak: then it is held against the model without it.
 WEAK = 0.8
-#: What the model without an effect is called in a sentence.
+#: Name of the model without an effect among the candidates.
 NOTHING = "nothing more"
 
 
@@ -40,14 +36,17 @@ def candidates(diagnosis: Diagnosis) -> dict[str, Fit]:
     return {}
 
 
-def next_experiment(diagnosis: Diagnosis, base: Path, out: Path, name: str = "next.yaml") -> str | None:
+def next_experiment(
+    diagnosis: Diagnosis, base: Path, out: Path, title_of: Callable[[str], str], name: str = "next.yaml"
+) -> str | None:
     """Set the verdict's ``next_experiment``, where something is left open.
 
     Args:
         diagnosis: what was found.
         base: file of the base scenario.
         out: directory in which the experiment's scenario will stand.
-        name: its file name.
+        title_of: words for a candidate: an effect's name, or ``NOTHING``.
+        name: the scenario's file name.
 
     Returns:
         The YAML text of the experiment's scenario.
@@ -56,7 +55,7 @@ def next_experiment(diagnosis: Diagnosis, base: Path, out: Path, name: str = "ne
     if len(found) < 2:
         return None
     started = time.perf_counter()
-    titles = {key: key if key == NOTHING else title_of(key) for key in found}
+    titles = {key: title_of(key) for key in found}
     try:
         proposal, text = propose(
             diagnosis.bench, found, base=base.resolve(), beside=out.resolve(), titles=titles

@@ -1,0 +1,99 @@
+"""Order spectra: the orders per wave-generator turn that a residual holds, over the measured angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.records import Array
+
+#: Order spectra: densely up to the first number, at integers up to the second.
+DENSE_ORDER, HIGHEST_ORDER = 4.6, 60
+#: Samples of which an order spectrum is made.
+SPECTRUM_SAMPLES = 8000
+#: Share of a channel's residual that a line of an order spectrum must hold to be listed.
+LEAST_LINE = 0.02
+
+
+@dataclass(frozen=True)
+class Line:
+    """A peak of an order spectrum: order per wave-generator turn, amplitude (SI), share of the residual."""
+
+    channel: str
+    order: float
+    amplitude: float
+    share: float
+
+
+def order_lines(bench: Bench, residuals: Sequence[Array], channel: str, most: int = 6) -> list[Line]:
+    """Strongest orders per wave-generator turn in a channel's residual.
+
+    The amplitude at an order is the least-squares one over the measured angle, so the speed may vary.
+    """
+    angle: list[Array] = []
+    value: list[Array] = []
+    fastest = turns = 0.0
+    rate = np.inf
+    for series, residual in zip(bench.series, residuals, strict=True):
+        if series.channel != channel or not len(residual) or not series.train.any():
+            continue
+        predictor = bench.predictors[series.record]
+        angle.append(predictor.motor_angle[series.train])
+        value.append(residual[series.train])
+        turns = max(turns, float(np.ptp(angle[-1])) / (2 * np.pi))
+        fastest = max(fastest, float(np.quantile(np.abs(predictor.motor_velocity), 0.5)) / (2 * np.pi))
+        rate = min(rate, 1.0 / predictor.record.period_s)
+    if not angle or turns < 1.0 or fastest == 0.0:
+        return []
+    theta, e = np.concatenate(angle), np.concatenate(value)
+    e = e - e.mean()
+    power = float(np.mean(e**2))
+    if power == 0.0:
+        return []
+    highest = min(float(HIGHEST_ORDER), 0.4 * rate / fastest)
+    step = max(0.4 / turns, DENSE_ORDER / 600)
+    orders = np.arange(max(0.5, 1.5 / turns), min(DENSE_ORDER, highest), step)
+    orders = np.unique(np.concatenate([orders, np.arange(1.0, int(highest) + 1)]))
+    if not len(orders):
+        return []  # too fast for the sampling to see any order
+    # A random part of the samples: taking every k-th would alias the high orders.
+    if len(theta) > SPECTRUM_SAMPLES:
+        part = np.sort(np.random.default_rng(0).choice(len(theta), SPECTRUM_SAMPLES, replace=False))
+        theta, e = theta[part], e[part]
+    waves = np.exp(-1j * np.outer(orders, theta))
+    lines: list[Line] = []
+    rest = e
+    while len(lines) < most:
+        shares = 2.0 * np.abs(waves @ rest / len(rest)) ** 2 / power
+        for near in (np.abs(orders - line.order) < 1.0 / turns for line in lines):
+            shares[near] = 0.0
+        k = int(np.argmax(shares))
+        if shares[k] < max(LEAST_LINE, 10.0 * float(np.median(shares))):
+            break
+        order = _refined(theta, rest, float(orders[k]), step)
+        whole = round(order)
+        if whole >= 1 and abs(order - whole) <= 0.5 / turns:
+            order = float(whole)
+        lines.append(Line(channel, order, 2.0 * abs(np.mean(rest * np.exp(-1j * order * theta))), shares[k]))
+        # The next one is looked for in what all lines so far leave, so that no side lobe is taken for a line.
+        angles = np.outer(theta, [line.order for line in lines])
+        columns = np.hstack([np.sin(angles), np.cos(angles)])
+        fitted, *_ = np.linalg.lstsq(columns, e, rcond=None)
+        rest = e - columns @ fitted
+        half = len(lines)
+        sizes = np.hypot(fitted[:half], fitted[half:])
+        lines = [
+            Line(channel, line.order, float(size), float(0.5 * size**2 / power))
+            for line, size in zip(lines, sizes, strict=True)
+        ]
+    return sorted(lines, key=lambda line: -line.share)
+
+
+def _refined(theta: Array, e: Array, order: float, step: float) -> float:
+    """The order within one step of ``order`` whose line is strongest."""
+    fine = order + step * np.linspace(-1.0, 1.0, 21)
+    power = [abs(np.mean(e * np.exp(-1j * n * theta))) for n in fine]
+    return float(fine[int(np.argmax(power))])

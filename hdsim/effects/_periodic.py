@@ -1,0 +1,91 @@
+"""The term of a fitting that reads from the data at which orders it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Self
+
+from hdsim.effects._terms import Found, Harmonic, Limits, Ranged, Settings, Term, Values
+from hdsim.nested import at, copied, put
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Periodic(Term):
+    """Harmonics whose orders per wave-generator turn are read from the data; one list item each.
+
+    Args:
+        section: path of the list.
+        amplitude: field of an item that is its amplitude.
+        unit: its value at coefficient 1.
+        settings: further fields of an item.
+        channel: the channel whose order spectrum says which orders.
+        besides: orders that the fitting's other terms have; given, the term may find no other ones.
+    """
+
+    section: str
+    amplitude: str
+    unit: float
+    channel: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    besides: tuple[float, ...] = ()
+
+    def paths(self) -> tuple[str, ...]:
+        """Amplitude and phase of the first item."""
+        return (f"{self.section}.0.{self.amplitude}", f"{self.section}.0.phase_deg")
+
+    def count(self, orders: Values) -> int:
+        """Two for each order."""
+        return 2 * len(orders)
+
+    def may_be_negative(self) -> bool:
+        """As those of a harmonic."""
+        return True
+
+    @property
+    def list_path(self) -> str:  # type: ignore[override]
+        """Its list."""
+        return self.section
+
+    def orders_among(self, lines: Iterable[tuple[str, float]], most: int) -> tuple[float, ...] | None:
+        """Of its channel, one a turn or more, but for those that other terms have."""
+        own = [order for channel, order in lines if channel == self.channel and order >= 1.0]
+        own = [order for order in own if not any(abs(order - other) < 0.05 for other in self.besides)]
+        return tuple(own[:most]) if own or self.besides else None
+
+    def harmonic(self, item: int) -> Harmonic:
+        """The harmonic that an item of the list is."""
+        path = f"{self.section}.{item}"
+        return Harmonic(f"{path}.{self.amplitude}", f"{path}.phase_deg", self.unit)
+
+    def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
+        """Append an item for each order."""
+        try:
+            items = copied(at(data, self.section))
+        except KeyError:
+            items = []
+        put(data, self.section, items)
+        for k, order in enumerate(orders):
+            items.append(dict(self.settings) | {"order": order})
+            self.harmonic(len(items) - 1).write(data, c[2 * k : 2 * k + 2], (), before)
+
+    def at_end(self, c: Values, plausible: Limits) -> bool:
+        """Any amplitude at its upper end."""
+        return any(self.harmonic(0).at_end(c[k : k + 2], plausible) for k in range(0, len(c), 2))
+
+    def rescaled(self, factor: float) -> Self:
+        """The unit times the factor."""
+        return replace(self, unit=self.unit * factor)
+
+    def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
+        """Order, amplitude and phase of each item."""
+        for k, order in enumerate(orders):
+            part = slice(2 * k, 2 * k + 2)
+            found[f"{self.section}.{items + k}.order"] = Ranged(order)
+            self.harmonic(items + k).report(found, c[part], covariance[part, part], (), items)
