@@ -238,8 +238,10 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             named = name_effect(bench, without, screening, left, on_step=tell)
         rest = found.named[:k] + found.named[k + 1 :]
         if named is None or (rest and _gain(bench, base, without, named.fit) < BEYOND_GAIN):
-            # The others explain what it did.
-            found.named.pop(k)
+            # The others explain what it did, so what it explained is theirs.
+            gone, newest = found.named.pop(k), found.named[-1] if found.named else None
+            if newest is not None and k < len(found.named):
+                newest.gain, newest.beyond = max(newest.gain, gone.gain), max(newest.beyond, gone.beyond)
             current = without
             continue
         loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)

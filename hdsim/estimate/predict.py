@@ -212,7 +212,9 @@ class Predictor:
         time, raw = self.record.time, self.record.filled(self.plan.motion)
         smooth = self.motor_angle / self._factor
         step = quantisation_step(raw[self.record.trusted[self.plan.motion]])
-        left = float(np.var(raw - smooth))
+        # A loop's hiccup is no noise of the sensor: the median does not see it.
+        rest = raw - smooth
+        left = min(float(np.var(rest)), float(np.median(np.abs(rest)) / 0.6745) ** 2)
         white = np.sqrt(max(left - step**2 / 12.0, 0.0))
         drawn = smooth + white * np.random.default_rng([seed, 11]).standard_normal(len(raw))
         drawn = np.round(drawn / step) * step if step > 0 else drawn

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import hdsim
+from hdsim.diagnose.following import next_experiment
 from hdsim.diagnose.workflow import diagnose
 from hdsim.errors import InputError
 from hdsim.estimate.records import Record
-from hdsim.tell.following import next_experiment
+from hdsim.tell.words import title_of
 
 LOCKED = """
 name: torsion
@@ -59,7 +60,7 @@ def test_hysteresis_is_named_from_torque_and_angle_alone(tmp_path, twisted, comm
     gap = found.verdict.gap["output_torque"]
     assert gap.after < 0.2 * gap.refit
     # What tells two laws apart is proposed; an experiment without a compared channel ends nothing.
-    assert next_experiment(found, tmp_path / "base.yaml", tmp_path) is not None
+    assert next_experiment(found, tmp_path / "base.yaml", tmp_path, title_of) is not None
 
 
 def test_a_locked_motor_without_the_outputs_torque_says_what_is_missing(tmp_path, twisted):
