@@ -10,6 +10,8 @@ import numpy as np
 from hdsim.estimate.data_problems import Check, Problem, Severity
 from hdsim.estimate.records import Array, Record
 
+#: Twist that a drive may have: size 20 at its ratcheting torque, 330 N m over 2.9e4 N m/rad (CSG catalogue).
+WIND_UP_RAD = 0.012
 #: Input speed beyond which a record is not believed, rev/min: twice the 14000 that the smallest sizes are
 #: rated for with oil (Harmonic Drive, CSG/CSF catalogue, rating tables).
 FASTEST_RPM = 30000.0
@@ -93,7 +95,8 @@ def compare_channels(record: Record, ratio: float, found: Check) -> None:
         motor, output = record.filled("motor_angle"), record.filled("output_angle")
         factor, explained = slope(motor / ratio, output)
         # A drive that only winds up (output locked) says nothing about the ratio.
-        if explained > 0.95 and (cause := explain(factor, ratio)):
+        wound = abs(factor - 1.0) * float(np.ptp(output))
+        if explained > 0.95 and wound > WIND_UP_RAD and (cause := explain(factor, ratio)):
             measured = f" (motor over output angle is {ratio / factor:.4g}, the model's ratio {ratio:g})"
             suspect("output_angle", factor, cause, f"motor_angle / {ratio:g}{measured}")
     for side, other, gear in (("motor", "output", ratio), ("output", "motor", 1.0 / ratio)):

@@ -31,7 +31,7 @@ WEIGHTS = (
     "beyond",
     "gain",
 )
-SPREAD = 1.0
+SPREAD = 0.5
 #: Those that can only speak against a name.
 AGAINST = ("own_left", "own_left_exact", "limit", "later")
 
