@@ -41,6 +41,9 @@ WORDINGS = {
     "a number stands at the end of its range": Wording(
         "one of its numbers stands at the end of its range", lambda _: "yes"
     ),
+    "part of the structure in its own coordinate that it leaves": Wording(
+        "part of what lived in its own coordinate that it leaves there", _part
+    ),
     "one more effect": Wording("not the first: a further effect", lambda k: f"no. {k + 1:.0f}"),
     "part of what a channel lacked that it explains": Wording(
         "part of what was missing in a channel at first that it explains", _part

@@ -75,7 +75,7 @@ def test_an_effect_that_was_found_twice_is_weighed_twice():
     evidence = EFFECT.model_copy(update={"laws": [law(), law(sampled=0.1, beyond=0.05)]})
     first, second = weighings(decide(evidence).because)
     assert first.name == second.name
-    assert (len(first.weights), len(second.weights)) == (3, 6)
+    assert (len(first.weights), len(second.weights)) == (4, 7)
     assert first.probability > second.probability
 
 
