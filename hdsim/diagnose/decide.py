@@ -111,7 +111,9 @@ def probability(evidence: Evidence, k: int, rules: Rules, because: list[Reason])
 def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, float]]:
     """Each piece of evidence on an effect: what it is, what was seen, its weight in log odds."""
     law = evidence.laws[k]
-    explained = rules.explained * (_log_odds(evidence.explained) - _log_odds(rules.explained_even))
+    # What is left elsewhere than in its own coordinate is another effect's, and counts half.
+    seen = 0.5 * (_log_odds(evidence.explained) + _log_odds(1.0 - law.own_left))
+    explained = rules.explained * (seen - _log_odds(rules.explained_even))
     held = rules.held * _held(evidence, rules)
     found = [
         # What all explain together speaks for the first; of a later one it only says that all are too little.
@@ -123,11 +125,14 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
         ("held-out data show the promised change", evidence.held.slope, min(held, 0.0) if k else held),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
+    left = law.own_left
+    if law.exact:
+        left = evidence.left if evidence.left_chance <= rules.chance else 0.0
     found.append(
         (
             "part of the structure in its own coordinate that it leaves",
-            law.own_left,
-            (rules.own_left_exact if law.exact else rules.own_left) * law.own_left,
+            left,
+            (rules.own_left_exact if law.exact else rules.own_left) * left,
         )
     )
     if law.at_limit:

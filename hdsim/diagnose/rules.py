@@ -44,7 +44,10 @@ class Rules(Part):
         -1.06, "log odds", "for all of the structure in its own coordinate left by a formula", BY
     )
     own_left_exact: float = _rule(
-        -8.0, "log odds", "the same for an exact one: a cable over the output is no unbalance", "chosen"
+        -40.0,
+        "log odds",
+        "for all of what an exact formula leaves being structure: a cable is no unbalance",
+        "5 % of the first matrix, seeds 100-502",
     )
     limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
     later: float = _rule(-1.08, "log odds", "for each effect beside the first", BY)

@@ -98,6 +98,12 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
 def _settled(bench: Bench, found: Search) -> Search:
     """The search's last fit carried on to its optimum, with the covariance there."""
     found.fit = together(bench, found.fit)
+    if found.named:
+        # What is left is what this fit leaves, not the rough one before it.
+        found.left = left_of(bench, found.fit)
+        last = found.stages[-1]
+        last.location = locate(bench, found.left, bench.residuals(found.fit.predictions))
+        last.power = found.left.power
     return found
 
 

@@ -92,12 +92,21 @@ class Bench:
             )
         self.blocks += count
 
-    def hear_motion(self, state: State) -> None:
+    def hear_motion(self, state: State, predictions: Sequence[Array]) -> None:
         """Add to every series' noise what the noise of the prescribed motion does to its prediction.
 
+        No more than what the model leaves of the channel: what is not there is no noise.
+
         Args:
-            state: the model, at plausible numbers.
+            state: the model, at fitted numbers.
+            predictions: its predictions.
         """
+        left: dict[str, float] = {}
+        for s, rest in zip(self.series, self.residuals(predictions), strict=True):
+            if len(rest) and s.train.any():
+                # The median: the stretches that something missing stirs up least.
+                own = float(np.median(np.abs(rest[s.train]))) / 0.6745
+                left[s.channel] = max(own, left.get(s.channel, 0.0))
         candidate = state.candidate()
         for index, predictor in enumerate(self.predictors):
             other = predictor.disturbed()
@@ -113,7 +122,9 @@ class Bench:
                     # It is compared beside the motor's angle, which has moved as well.
                     change = change - (other.motor_angle - predictor.motor_angle) / predictor.ratio
                 rows = s.train | s.hold
-                s.noise = float(np.hypot(s.noise, np.std(change[rows]))) if rows.any() else s.noise
+                if rows.any():
+                    heard = float(np.hypot(s.noise, np.std(change[rows])))
+                    s.noise = max(s.noise, min(heard, left.get(s.channel, heard)))
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -23,6 +23,8 @@ ALONE = 0.8
 WEIGHINGS, ALIKE = 3, 1.5
 #: Part of what is left beside the noise below which the delays that leave it are believed at once.
 ALL = 0.1
+#: Prior spreads that a number may have gone for a fit to begin at the given one too.
+FAR = 2.0
 
 
 @dataclass
@@ -86,10 +88,10 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         frees = base_freedoms(state, bench.channels, load_known=bench.load_known, locked=locked)
     freedoms = list(frees)
     before = bench.predict(state)
-    bench.hear_motion(state)
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
+    bench.hear_motion(found.state, found.predictions)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
     # still hold much of it leaves what the next one finds.
     reweigh(bench, found)
@@ -136,7 +138,11 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
         rough: as in ``fit``.
     """
     frees = [*at_present(found), *found.undetermined]
-    whole = fit(bench, state or found.state, frees, rough=rough)
+    # A number that a missing effect has driven to nearly nothing leaves no slope to come back by.
+    far = {f.name: f.none for f in frees if not f.step and abs(f.none) > FAR * f.prior}
+    begins = [None, far] if far else [None]
+    tried = [fit(bench, state or found.state, frees, theta=begin, rough=rough) for begin in begins]
+    whole = min(tried, key=lambda each: bench.power(each.predictions))
     if not rough:
         _widened(bench, whole)
     return whole

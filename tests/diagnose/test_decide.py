@@ -29,8 +29,14 @@ def test_a_law_that_explains_most_is_named_though_no_formula_is_exact():
 
 
 def test_a_law_that_explains_little_is_not():
-    decision = decide(found(law(), explained=0.3, left=0.6, held=HeldOutEvidence(slope=0.9, spread=0.05)))
-    assert decision.kind == "unknown"
+    little = found(law(own_left=0.6), explained=0.3, held=HeldOutEvidence(slope=0.9, spread=0.05))
+    assert decide(little).kind == "unknown"
+
+
+def test_what_another_missing_effect_leaves_does_not_take_a_name_away():
+    """A real joint lacks friction and more: its friction is clear, though half of the structure is left."""
+    held = HeldOutEvidence(slope=1.0, spread=0.2)
+    assert decide(found(law("input_coulomb_viscous"), explained=0.5, held=held)).kind == "effect"
 
 
 def test_held_out_data_that_hardly_excite_an_effect_do_not_judge_it():
