@@ -38,7 +38,7 @@ class Rules(Part):
         "chosen",
     )
     held_for: float = _rule(1.5, "log odds", "most that held-out data can say for effects", "chosen")
-    held_against: float = _rule(4.0, "log odds", "most that they can say against them", "chosen")
+    held_against: float = _rule(8.0, "log odds", "most that they can say against them", "chosen")
     sampled: float = _rule(0.04, "log odds per log odds", "weight of the share of resampled records won", BY)
     own_left: float = _rule(
         -1.06, "log odds", "for all of the structure in its own coordinate left by a formula", BY
@@ -60,7 +60,9 @@ class Rules(Part):
         "weight of the part of what a channel lacked that a later one explains",
         BY,
     )
-    believed: float = _rule(0.6, "probability", "least confidence of a name that is given", "chosen")
+    believed: float = _rule(
+        0.5, "probability", "least confidence of a name: more likely right than not", "a principle"
+    )
     structured: float = _rule(
         0.12,
         "1",
