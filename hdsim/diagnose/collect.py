@@ -94,6 +94,7 @@ def _law(one: Named, at_limit: bool, stages: Sequence[Stage]) -> LawEvidence:
         chance=one.chance,
         sampled=one.confidence,
         gain=one.gain,
+        of_left=one.of_left,
         beyond=one.beyond,
         own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
         exact=catalogue()[one.name].signature.exact,

@@ -73,6 +73,8 @@ class LawEvidence(Part):
     """Share of resampled records, over blocks of time, in which it or its group is the best."""
     gain: float
     """Part of the first pass's structure that it explained when it was added."""
+    of_left: float = 1.0
+    """Part of what was left beyond the noise when it was added that its fit explained."""
     beyond: float = 1.0
     """Part of what its trace explains that no smooth curve over the others' coordinates can."""
     own_left: float = 0.0

@@ -63,6 +63,7 @@ class Named:
         chance: of the search that found it.
         alternatives: fits of the others on the shortlist, carried on to their optimum but not proved there.
         candidates: all that were fitted, the best first, as evidence.
+        of_left: part of what was left beyond the noise that its fit explained; likewise.
         gain: part of the first pass's structure that it explained; set by the search.
         beyond: part of its trace's share that curves over the others' coordinates leave it; likewise.
     """
@@ -78,6 +79,7 @@ class Named:
     candidates: list[CandidateEvidence]
     gain: float = 1.0
     beyond: float = 1.0
+    of_left: float = 1.0
 
 
 def name_effect(

@@ -50,15 +50,12 @@ class Rules(Part):
         "5 % of the first matrix, seeds 100-502",
     )
     limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
-    later: float = _rule(-1.08, "log odds", "for each effect beside the first", BY)
+    later: float = _rule(-1.4, "log odds", "for each effect beside the first", BY)
     beyond: float = _rule(
-        0.71, "log odds per log odds", "weight of what an effect explains beyond smooth curves", BY
+        0.6, "log odds per log odds", "weight of what an effect explains beyond smooth curves", BY
     )
-    gain: float = _rule(
-        0.83,
-        "log odds per log odds",
-        "weight of the part of what a channel lacked that a later one explains",
-        BY,
+    of_left: float = _rule(
+        1.0, "log odds per log odds", "weight of the part of what was left that a later one explains", BY
     )
     believed: float = _rule(
         0.5, "probability", "least confidence of a name: more likely right than not", "a principle"

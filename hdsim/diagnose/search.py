@@ -178,6 +178,7 @@ def _one_more(
     own = found.left.share(alone.columns).share * found.left.power
     named.beyond = float(np.clip(alone.share.share * left.power / own, 0.0, 1.0)) if own > 0 else 0.0
     named.gain = _gain(bench, base, current, named.fit)
+    named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
     return named if named.gain >= least else None
 
@@ -247,7 +248,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             # The others explain what it did, so what it explained is theirs.
             gone, newest = found.named.pop(k), found.named[-1] if found.named else None
             if newest is not None and k < len(found.named):
-                newest.gain, newest.beyond = max(newest.gain, gone.gain), max(newest.beyond, gone.beyond)
+                _inherit(newest, gone)
             current = without
             continue
         loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
@@ -262,10 +263,16 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
-            own.gain, own.beyond = found.named[k].gain, found.named[k].beyond
+            _inherit(own, found.named[k])
             found.named[k] = own
         k += 1
     return current
+
+
+def _inherit(one: Named, other: Named) -> None:
+    """A name that takes another's place explains at least what that did."""
+    one.gain = max(one.gain, other.gain)
+    one.beyond, one.of_left = max(one.beyond, other.beyond), max(one.of_left, other.of_left)
 
 
 def _clear(one: Named, newest: Named) -> bool:

@@ -45,8 +45,8 @@ WORDINGS = {
         "part of what lived in its own coordinate that it leaves there", _part
     ),
     "one more effect": Wording("not the first: a further effect", lambda k: f"no. {k + 1:.0f}"),
-    "part of what a channel lacked that it explains": Wording(
-        "part of what was missing in a channel at first that it explains", _part
+    "part of what was left that it explains": Wording(
+        "part of what the effects before it left that it explains", _part
     ),
     "what it explains beyond smooth curves over the others' coordinates": Wording(
         "part of it that no smooth curve of the other effects can stand in for", _part

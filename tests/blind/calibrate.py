@@ -29,7 +29,7 @@ WEIGHTS = (
     "limit",
     "later",
     "beyond",
-    "gain",
+    "of_left",
 )
 SPREAD = 0.5
 #: Those that can only speak against a name.

@@ -66,7 +66,7 @@ def test_what_is_left_beyond_the_noise_is_unknown():
 
 
 def test_a_second_name_that_a_smooth_curve_explains_as_well_is_not_given():
-    decision = decide(found(law(), law("damaged_tooth", beyond=0.05, gain=0.02)))
+    decision = decide(found(law(), law("damaged_tooth", beyond=0.05, of_left=0.2)))
     assert decision.names == [0]
 
 
