@@ -249,6 +249,9 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             gone, newest = found.named.pop(k), found.named[-1] if found.named else None
             if newest is not None and k < len(found.named):
                 _inherit(newest, gone)
+                if newest.name in gone.group:
+                    # It was as good a name before, and neither is needed beside the other.
+                    newest.group[gone.name] = 1.0
             current = without
             continue
         loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
@@ -263,7 +266,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
-            _inherit(own, found.named[k])
+            before = found.named[k]
+            own.gain, own.beyond, own.of_left = before.gain, before.beyond, before.of_left
             found.named[k] = own
         k += 1
     return current
