@@ -6,11 +6,12 @@ import argparse
 import importlib
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from contract import AbsentError
 from judging import Line, outcome, said
-from running import FAMILIES, Task, attempt, family, lines_of, run, stored, task_of
+from running import FAMILIES, Task, attempt, family, keep, lines_of, run, stored, task_of
 
 #: Never used to calibrate, whatever its seeds: what is stated of it, no rule has seen.
 LEFT_OUT = "mujoco"
@@ -43,19 +44,33 @@ def line_of(line: Line) -> str:
     )
 
 
-def run_all(given: argparse.Namespace) -> None:
-    """Run the cases that were asked for and are not stored yet."""
-    wanted = []
+def tasks(given: argparse.Namespace) -> list[Task]:
+    """The cases that were asked for, of the families that are here."""
+    wanted: list[Task] = []
     for name in given.families.split(","):
         try:
             family(name)
         except AbsentError as missing:
             print(f"skipped: {missing}")
             continue
-        most, numbers = given.most_samples, numbers_of(given.numbers)
-        wanted += [Task(name, n, seed, most) for seed in numbers_of(given.seed) for n in numbers]
+        numbers, seeds = numbers_of(given.numbers), numbers_of(given.seed)
+        wanted += [Task(name, n, seed, given.most_samples, given.cases) for seed in seeds for n in numbers]
     # Families in turn, so that a part of the run has all of them.
     wanted.sort(key=lambda task: (task.seed, task.number))
+    return wanted
+
+
+def draw_all(given: argparse.Namespace) -> None:
+    """Draw cases and keep them, so that runs need not draw them again."""
+    todo = tasks(given)
+    for count, line in enumerate(run(todo, given.jobs, keep), 1):
+        text = line if isinstance(line, AbsentError) else f"{line['key']} {line['error'] or ''}"
+        print(f"[{count}/{len(todo)}] {text}", flush=True)
+
+
+def run_all(given: argparse.Namespace) -> None:
+    """Run the cases that were asked for and are not stored yet."""
+    wanted = tasks(given)
     given.results.parent.mkdir(parents=True, exist_ok=True)
     known = {Task(r["family"], r["number"], r["seed"]) for r in lines_of([given.results])}
     todo = [task for task in wanted if task not in known]
@@ -73,7 +88,7 @@ def run_all(given: argparse.Namespace) -> None:
 
 def one(given: argparse.Namespace) -> None:
     """Run one case again and print what comes of it."""
-    line = attempt(task_of(given.key))
+    line = attempt(replace(task_of(given.key), cases=given.cases))
     print(json.dumps(json.loads(stored(line | {"evidence": None})), indent=1))
     print(line_of(line))
 
@@ -120,20 +135,28 @@ def main() -> None:
     def paths(text: str) -> list[Path]:
         return [Path(part) for part in text.split(",")]
 
-    command = commands.add_parser("run", help="draw cases, diagnose them, store a line each")
-    command.add_argument("--families", default=",".join(FAMILIES))
-    command.add_argument("--numbers", default="0-49", help="e.g. 0-49 or 3,7")
-    command.add_argument(
-        "--seed", default="1", help="even: calibration, odd: statement; several as for --numbers"
-    )
-    command.add_argument("--jobs", type=int, default=1, help="processes")
-    command.add_argument("--most-samples", type=int, default=10**9, metavar="N",
-                         help="leave out cases whose records hold more samples together")  # fmt: skip
-    command.add_argument("--results", type=Path, default=Path("results/blind.jsonl"),
-                         help="JSON-lines file: cases in it are not run again")  # fmt: skip
-    command.set_defaults(run=run_all)
+    for name, call, text in (
+        ("draw", draw_all, "draw cases and keep them"),
+        ("run", run_all, "draw cases, diagnose them, store a line each"),
+    ):
+        command = commands.add_parser(name, help=text)
+        command.add_argument("--families", default=",".join(FAMILIES))
+        command.add_argument("--numbers", default="0-49", help="e.g. 0-49 or 3,7")
+        command.add_argument(
+            "--seed", default="1", help="even: calibration, odd: statement; several as for --numbers"
+        )
+        command.add_argument("--jobs", type=int, default=1, help="processes")
+        command.add_argument("--cases", type=Path, default=None, metavar="FOLDER",
+                             help="where drawn cases are kept, and taken from")  # fmt: skip
+        command.add_argument("--most-samples", type=int, default=10**9, metavar="N",
+                             help="leave out cases whose records hold more samples together")  # fmt: skip
+        command.add_argument("--results", type=Path, default=Path("results/blind.jsonl"),
+                             help="JSON-lines file: cases in it are not run again")  # fmt: skip
+        command.set_defaults(run=call)
     command = commands.add_parser("one", help="run one case again, print the verdict")
     command.add_argument("key", help="family/kind/truth/number/seed")
+    command.add_argument("--cases", type=Path, default=None, metavar="FOLDER",
+                         help="where drawn cases are kept")  # fmt: skip
     command.set_defaults(run=one)
     for name, call, text in (
         ("show", show, "print stored cases whose key holds the text"),

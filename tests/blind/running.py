@@ -7,9 +7,10 @@ import importlib
 import json
 import multiprocessing
 import os
+import pickle
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -34,6 +35,7 @@ class Task:
     number: int
     seed: int
     most_samples: int = field(default=10**9, compare=False)
+    cases: Path | None = field(default=None, compare=False)  # where drawn cases are kept
 
 
 def task_of(key: str) -> Task:
@@ -52,6 +54,41 @@ def family(name: str) -> ModuleType:
         return importlib.import_module(f"family_{name}")
     except ModuleNotFoundError as error:
         raise AbsentError(f"family {name}: {error}") from None
+
+
+def drawn(task: Task) -> Case:
+    """The case of a task: as it is kept, or drawn now, and kept where the task has a folder for that.
+
+    Raises:
+        AbsentError: what the family needs is not here.
+    """
+    module = family(task.family)
+    if task.cases is None:
+        case: Case = module.draw(task.number, task.seed)
+        return case
+    kept = task.cases / f"{task.family}-{task.number}-{task.seed}.pickle"
+    if kept.exists():
+        case = pickle.loads(kept.read_bytes())
+        return case
+    case = module.draw(task.number, task.seed)
+    task.cases.mkdir(parents=True, exist_ok=True)
+    part = kept.with_suffix(f".{os.getpid()}")
+    part.write_bytes(pickle.dumps(case))
+    part.replace(kept)
+    return case
+
+
+def keep(task: Task) -> Line:
+    """Draw a case to be kept, and say so in a line."""
+    started = time.process_time()
+    line: Line = {"key": f"{task.family}/-/-/{task.number}/{task.seed}", "error": None}
+    try:
+        line["key"] = drawn(task).key
+    except AbsentError:
+        raise
+    except Exception as error:
+        line["error"] = f"not drawn: {_words(error)}"
+    return line | {"made_cpu_s": round(time.process_time() - started, 2)}
 
 
 def base_of(case: Case) -> Scenario:
@@ -77,7 +114,7 @@ def attempt(task: Task) -> Line:
     line: Line = {"key": "", "family": task.family, "number": task.number, "seed": task.seed, "kind": "",
                   "truth": [], "strength": [], "setup": {}, "verdict": None, "error": None}  # fmt: skip
     try:
-        case = family(task.family).draw(task.number, task.seed)
+        case = drawn(task)
     except AbsentError:
         raise
     except Exception as error:
@@ -159,12 +196,14 @@ def lines_of(paths: Sequence[Path]) -> list[Line]:
     return list(found.values())
 
 
-def run(todo: Sequence[Task], jobs: int) -> Iterator[Line | AbsentError]:
-    """Lines as they come."""
+def run(
+    todo: Sequence[Task], jobs: int, work: Callable[[Task], Line] = attempt
+) -> Iterator[Line | AbsentError]:
+    """Lines of ``work`` as they come."""
     if jobs == 1:
         for task in todo:
             try:
-                yield attempt(task)
+                yield work(task)
             except AbsentError as missing:
                 yield missing
         return
@@ -173,7 +212,7 @@ def run(todo: Sequence[Task], jobs: int) -> Iterator[Line | AbsentError]:
         os.environ.setdefault(name, "1")
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        for future in concurrent.futures.as_completed([pool.submit(attempt, task) for task in todo]):
+        for future in concurrent.futures.as_completed([pool.submit(work, task) for task in todo]):
             try:
                 yield future.result()
             except AbsentError as missing:
