@@ -120,7 +120,7 @@ class Vector:
         return lower, upper
 
     def steps(self, x: Array) -> Array:
-        """Steps of finite differences at ``x``, shape (p,)."""
+        """Steps of finite differences at ``x``, shape (p,): back from an end that a number stands at."""
         own = np.array([SMALL_STEP if free.compliance else STEP for free in self.frees])
         steps = (own / self.rates(x)).tolist()
         at = len(self.frees)
@@ -128,7 +128,8 @@ class Vector:
             steps += [SMALL_STEP * max(1.0, abs(v)) for v in x[at : at + len(added.coefficients)]]
             steps += [SMALL_STEP] * len(added.shapes)
             at += len(added.coefficients) + len(added.shapes)
-        return np.array(steps)
+        sizes = np.array(steps)
+        return np.asarray(np.where(x + sizes > self.bounds()[1], -sizes, sizes))
 
 
 class Measured:
@@ -232,7 +233,7 @@ def _shorter(like: Array, steps: Array, vector: Vector, first: int = 0) -> Array
     """
     own = slice(first, first + like.shape[1])
     factors = np.ones(len(steps))
-    size = np.sqrt(np.mean(like**2, axis=0)) * steps[: like.shape[1]]
+    size = np.sqrt(np.mean(like**2, axis=0)) * np.abs(steps[: like.shape[1]])
     most = np.where(vector.coefficients()[own], MOST_STEP, 1.0)
     factors[: like.shape[1]] = np.clip(CHANGE / np.maximum(size, 1e-300), LEAST_STEP, most)
     return factors
