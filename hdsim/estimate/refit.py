@@ -95,10 +95,14 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
     # still hold much of it leaves what the next one finds.
     reweigh(bench, found)
-    for _ in range(WEIGHINGS):
+    for weighing in range(WEIGHINGS):
         theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
-        slopes = found.columns, math.nan
-        found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes, after=found)
+        if weighing == 0 and found.undetermined:
+            # Far from the end, what the data see may look different from there.
+            found = fit(bench, state, [*found.frees, *found.undetermined], theta=theta)
+        else:
+            known = found.columns, math.nan
+            found = fit(bench, state, found.frees, theta=theta, prune=False, known=known, after=found)
         align(bench, found)
         if reweigh(bench, found) < ALIKE:
             break
