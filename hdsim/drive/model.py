@@ -112,7 +112,7 @@ class Model(Contributed):
 
     def _mesh_parameters(self) -> tuple[Kernel | None, Array]:
         """The mesh kernel and its numbers."""
-        from hdsim.drive import _mesh, spring, toothed
+        from hdsim.drive import _mesh, _mesh_layout, spring, toothed
 
         mesh = self.drive.mesh
         if isinstance(mesh, RigidMesh):
@@ -125,12 +125,12 @@ class Model(Contributed):
                 [torsion.torque_t1_nm, torsion.torque_t2_nm],
                 reach,
             )
-            parameters = np.zeros(_mesh.HEADER)
-            parameters[_mesh.INVERSE_RATIO] = 1 / self.ratio
-            parameters[_mesh.EXTRA_GAP] = self._given.half_gap_rad
-            parameters[_mesh.SPRING_STEP] = step
-            parameters[_mesh.SPRING_CELLS] = len(cells)
-            parameters[_mesh.SPRING_AT] = _mesh.HEADER
+            parameters = np.zeros(_mesh_layout.HEADER)
+            parameters[_mesh_layout.INVERSE_RATIO] = 1 / self.ratio
+            parameters[_mesh_layout.EXTRA_GAP] = self._given.half_gap_rad
+            parameters[_mesh_layout.SPRING_STEP] = step
+            parameters[_mesh_layout.SPRING_CELLS] = len(cells)
+            parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER
             return _mesh.lumped_mesh, np.concatenate([parameters, cells.ravel()])
         self.teeth = toothed.Teeth(
             self.drive,
