@@ -17,7 +17,7 @@ from hdsim.kernel import OWN, SIGNAL_VALUES, Kernel
 if TYPE_CHECKING:
     from hdsim.drive.toothed import Teeth
     from hdsim.parts import Part
-    from hdsim.simulation.system import System
+    from hdsim.system import System
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Model(Contributed):
             account: what the energy audit needs.
 
     Attributes:
-        system: the ODE, a ``hdsim.simulation.system.System``.
+        system: the ODE, a ``hdsim.system.System``.
         states: the parts' own states in their order in the state vector.
         teeth: gaps, pitch errors and contact table of the toothed meshes, else None.
         heat_accounts: names of the accounts of heat, in the order of the compiled code; none without audit.
@@ -162,7 +162,7 @@ class Model(Contributed):
     def _assemble(self) -> System:
         from hdsim.drive import _layout as a
         from hdsim.drive._assembly import drive_system
-        from hdsim.simulation.system import System
+        from hdsim.system import System
 
         given = self._given
         if "output" in self.motions and self.rigid:

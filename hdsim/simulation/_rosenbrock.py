@@ -78,7 +78,7 @@ def advance(  # type: ignore[no-untyped-def]
 
     Args:
         address: of the system kernel; ``integers``, ``reals`` and ``scratch`` are its own.
-        integers: see ``hdsim.simulation.system.System``.
+        integers: see ``hdsim.system.System``.
         reals: likewise.
         scratch: likewise.
         stops: increasing times at which a step has to end, shape (s,).

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hdsim._evaluate import evaluate
 from hdsim.drive import _layout as a
 from hdsim.drive import _mesh_layout
 from hdsim.drive.model import COORDINATES, Model
 from hdsim.errors import InputError
 from hdsim.kernel import MESH_TORQUE, OWN, TRANSMITTED_TORQUE, TWIST_TORQUE
-from hdsim.simulation._evaluate import evaluate
 from hdsim.simulation.ports import INPUTS, OUTPUT_UNITS, TorqueInputs
 
 if TYPE_CHECKING:

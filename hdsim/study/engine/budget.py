@@ -156,8 +156,8 @@ def _prepared(scenario: Scenario) -> dict[str, Any]:
 
 def _chosen(recording: Recording, metric: str | None) -> tuple[str, str, tuple[int, int] | None]:
     """Name and unit of the error, and the samples over which a positioning error is the mean."""
+    from hdsim.study.known_metrics import find_metric
     from hdsim.study.metrics._spans import dwells
-    from hdsim.study.registry import find_metric
 
     if metric is not None and metric != POSITIONING:
         return metric, find_metric(metric).unit, None
@@ -177,7 +177,7 @@ def _error(
 ) -> float:
     """The error of a run with some causes on; runs on a worker."""
     from hdsim.recording import Column
-    from hdsim.study.registry import find_metric
+    from hdsim.study.known_metrics import find_metric
 
     recording, scenario = _run(text, on)
     if reference is not None and "reference_angle" not in recording:
