@@ -44,7 +44,7 @@ MEANINGS = {
     "better no name than a wrong one.",
 }
 #: Words for the probability that a name is right, from the highest down.
-_SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sure"))
+SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sure"))
 #: Words for how many standard errors the number that moved farthest lies from the model's.
 _FAR = ((6.0, "Very sure"), (3.5, "Sure"), (0.0, "Fairly sure"))
 #: Nothing is called very sure while more than this is left: times the noise, part of the structure.
@@ -245,7 +245,7 @@ def _capped(sure: Sureness, found: Findings) -> Sureness:
 def _of_effects(found: Findings) -> Sureness:
     effects = found.verdict.effects
     least = min((effect.confidence for effect in effects), default=0.0)
-    words = _word(_SURE, least)
+    words = _word(SURE, least)
     grouped = any(effect.indistinguishable_from for effect in effects)
     if grouped:
         words += (
