@@ -19,6 +19,7 @@ from hdsim.cli import COMMANDS
 from hdsim.diagnose.experiments import LONGEST_S
 from hdsim.diagnose.following import WEAK
 from hdsim.diagnose.verdict import NamedEffect, Verdict
+from hdsim.effects import catalogue
 from hdsim.estimate.check import LONGEST_GAP_S, SLOWEST_HZ
 from hdsim.estimate.found import Gap
 from hdsim.estimate.records import FEWEST_SAMPLES, SHORTEST_S
@@ -120,6 +121,11 @@ def test_the_schema_beside_the_scenarios_is_current() -> None:
     path = ROOT / "scenarios" / "scenario.schema.json"
     stored = json.loads(path.read_text(encoding="utf-8"))
     assert stored == json.loads(json.dumps(json_schema(Scenario))), "run: make schema"
+
+
+def test_the_readme_counts_the_effects() -> None:
+    many = len(set(catalogue()) - {"table"})  # a curve for what is no effect of the catalogue
+    assert f"{many} further physical effects" in README.read_text(encoding="utf-8")
 
 
 def test_the_readme_lists_every_command() -> None:
