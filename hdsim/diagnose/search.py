@@ -128,7 +128,10 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     stage.named = named
     found.named.append(named)
-    current = named.fit if len(found.named) > 1 else sharpened(bench, named.fit)
+    current = named.fit
+    if len(found.named) == 1:
+        # A base that carried nothing could tell nothing of its springs.
+        current = together(bench, current) if current.undetermined else sharpened(bench, current)
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
