@@ -90,6 +90,8 @@ def contest(
 
     def keep(name: str, several: list[Fit]) -> None:
         for each in several:
+            # They are asked again with the effect that wins.
+            each.undetermined, each.ties = base.undetermined, base.ties
             loss = bench.power(each.predictions)
             if name not in best or loss < best[name][0]:
                 best[name] = loss, each

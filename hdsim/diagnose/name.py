@@ -222,9 +222,9 @@ def simplest_first(results: list[tuple[str, Fit, Array]], same: float) -> list[t
 
 
 def freedom(found: Fit) -> int:
-    """Free numbers of a fit's last effect."""
+    """Free numbers of a fit's last effect; orders that are read from the data are, too."""
     added = found.state.added[-1]
-    return len(added.coefficients) + len(added.shapes)
+    return len(added.coefficients) + len(added.shapes) + len(added.orders)
 
 
 def confusable(one: str, other: str) -> bool:

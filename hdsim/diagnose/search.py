@@ -8,12 +8,12 @@ more is found, and all is asked once more when they have explained something.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdsim.diagnose.locate import Location, curves_over, locate
+from hdsim.diagnose.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnose.name import (
     LEAST_SHARE,
     LEVEL,
@@ -118,7 +118,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
-    if found.named and not _more_could(bench, base, current):
+    if found.named and not (stage.location.sharp(LEVEL) or _more_could(bench, base, current)):
         return None
     for beyond in (True, False) if found.named else (False,):
         named = _one_more(bench, base, current, found, stage, beyond, during)
@@ -156,7 +156,7 @@ def _one_more(
     No formula is ever exact, and what the present ones leave in their own coordinates would be taken for
     another effect. An effect that shows there only must explain much more.
     """
-    left = beyond_curves(bench, current, found.left, found.named) if beyond else found.left
+    left = beyond_curves(bench, current, found.left) if beyond else found.left
     places = stage.location.places
     if stage.screening is None:
         tell = during("screen", "screening the catalogue")
@@ -182,20 +182,44 @@ def _one_more(
     named.beyond = float(np.clip(alone.share.share * left.power / own, 0.0, 1.0)) if own > 0 else 0.0
     named.gain = _gain(bench, base, current, named.fit)
     named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
+    if beyond and named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL):
+        return named  # lines stand out of what is left, however little it is beside what was missing
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
     return named if named.gain >= least else None
 
 
-def beyond_curves(bench: Bench, current: Fit, left: Residual, named: Sequence[Named]) -> Residual:
-    """A residual without what smooth curves over the coordinates of the named effects explain."""
+def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
+    """A residual without what smooth curves over the coordinates of the added effects explain.
+
+    An exact formula leaves nothing there: what is left in its coordinate is another's.
+    """
     homes = {
         (coordinate, channel)
-        for one in named
-        for coordinate in catalogue()[one.name].signature.lives_in
-        for channel in bench.channels
+        for one, channels in zip(current.state.added, shown_in(bench, current), strict=True)
+        if not catalogue()[one.effect].signature.exact
+        for coordinate in one.lives_in
+        for channel in channels
     }
     curves = curves_over(bench, bench.residuals(current.predictions), homes)
     return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
+
+
+def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
+    """Channels in which each added effect shows more than the noise: in others it can leave nothing."""
+    numbers, noise = bench.stacked_series(), bench.noise_powers
+    at, found = len(current.frees), []
+    for added in current.state.added:
+        columns = current.columns[:, at : at + len(added.coefficients)]
+        powers = (columns @ np.array(added.coefficients)) ** 2
+        at += len(added.coefficients) + len(added.shapes)
+        own = {
+            channel: sum(
+                float(powers[numbers == k].sum()) for k, s in enumerate(bench.series) if s.channel == channel
+            )
+            for channel in bench.channels
+        }
+        found.append([channel for channel in bench.channels if own[channel] > noise[channel]])
+    return found
 
 
 def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:

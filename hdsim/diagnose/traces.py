@@ -96,7 +96,7 @@ def screen(
     measured = bench.measured
     for name, kind in catalogue().items():
         fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
-        if name in present and name != "sensors":
+        if name in present and not kind.several:
             found.skipped[name] = "the model has it"
             continue
         if not fittings:

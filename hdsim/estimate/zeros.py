@@ -30,10 +30,10 @@ class Zero:
 
 
 def between_zeros(record: Record, ratio: float) -> tuple[int, float]:
-    """How far the encoders' zeros lie apart: whole turns of the motor, and the rest as an angle of the output.
+    """How far the encoders' zeros lie apart: whole turns of the motor, and the rest as an output angle.
 
-    Weights, and errors of the output's own, lie at angles of the output's encoder, those of the wave generator
-    at angles within a turn of the motor's. A motor's encoder counts its turns from where it was switched on.
+    Weights, and errors of the output's own, lie at angles of the output's encoder, those of the wave
+    generator at angles within a turn of the motor's, which counts turns from where it was switched on.
 
     Args:
         record: the measured run, with both angles.
