@@ -14,7 +14,7 @@ from hdsim.diagnose.evidence import (
     RestEvidence,
     StageEvidence,
 )
-from hdsim.diagnose.locate import Location
+from hdsim.diagnose.locate import SHARP, Location
 from hdsim.diagnose.name import Named
 from hdsim.diagnose.search import Search, Stage
 from hdsim.effects import catalogue
@@ -95,7 +95,8 @@ def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
         chance=one.chance,
         sampled=one.confidence,
         gain=one.gain,
-        of_left=one.of_left,
+        # Sharp lines are no part of what smooth effects have left.
+        of_left=max(one.of_left, one.of_lines) if added.lives_in[0] == SHARP else one.of_left,
         beyond=one.beyond,
         own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
         exact=catalogue()[one.name].signature.exact,

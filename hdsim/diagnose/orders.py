@@ -95,6 +95,26 @@ def _refined(theta: Array, e: Array, order: float, step: float) -> float:
     return float(fine[int(np.argmax(power))])
 
 
+def power_of(bench: Bench, residuals: Sequence[Array], lines: Sequence[Line]) -> float:
+    """Whitened power that least squares finds at the orders of some lines in their channels' residuals.
+
+    Args:
+        bench: the measured series.
+        residuals: of every series, SI units.
+        lines: peaks of order spectra.
+    """
+    total = 0.0
+    for series, residual in zip(bench.series, residuals, strict=True):
+        orders = [line.order for line in lines if line.channel == series.channel]
+        if not orders or not len(residual) or not series.train.any():
+            continue
+        own = residual[series.train] / series.sigma
+        theta = bench.predictors[series.record].motor_angle[series.train]
+        left, _ = _without(theta, own - own.mean(), orders)
+        total += float(np.sum((own - own.mean()) ** 2) - np.sum(left**2))
+    return total
+
+
 def _whole(order: float, turns: float) -> float:
     """The whole number next to an order, where the record is too short to tell it from that."""
     whole = round(order)

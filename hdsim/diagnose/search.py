@@ -8,21 +8,15 @@ more is found, and all is asked once more when they have explained something.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hdsim.diagnose.locate import SHARP, Location, curves_over, locate
-from hdsim.diagnose.name import (
-    LEAST_SHARE,
-    LEVEL,
-    SAME,
-    Named,
-    name_effect,
-)
-from hdsim.diagnose.orders import Line, order_lines
-from hdsim.diagnose.screen import Residual
+from hdsim.diagnose.name import LEAST_SHARE, SAME, Named, name_effect
+from hdsim.diagnose.orders import Line, order_lines, power_of
+from hdsim.diagnose.screen import LEVEL, Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
@@ -131,12 +125,14 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     current = named.fit
     if len(found.named) == 1:
         # A base that carried nothing could tell nothing of its springs.
-        current = together(bench, current) if current.undetermined else sharpened(bench, current)
+        current = together(bench, current, rough=True) if current.undetermined else current
+        current = sharpened(bench, current)
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
         tell = during("again", "asking each name again beside the others")
         current = _again(bench, base, together(bench, current, rough=True), found, tell)
+        current = sharpened(bench, current)
         align(bench, current)
         reweigh(bench, current)
     return current
@@ -182,8 +178,11 @@ def _one_more(
     named.beyond = float(np.clip(alone.share.share * left.power / own, 0.0, 1.0)) if own > 0 else 0.0
     named.gain = _gain(bench, base, current, named.fit)
     named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
-    if beyond and named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL):
-        return named  # lines stand out of what is left, however little it is beside what was missing
+    sharp = named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL)
+    if found.named and sharp:
+        # Lines stand out of what is left, however little they are beside what was missing and what still is.
+        named.of_lines = _of_lines(bench, current, named.fit, stage.location.lines)
+        return named
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
     return named if named.gain >= least else None
 
@@ -227,6 +226,12 @@ def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
     first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
     noise = bench.noise_powers
     return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
+
+
+def _of_lines(bench: Bench, before: Fit, now: Fit, lines: Sequence[Line]) -> float:
+    """Part of the lines of what was left that a fit explains."""
+    last, new = (power_of(bench, bench.residuals(each.predictions), lines) for each in (before, now))
+    return float(np.clip(1.0 - new / last, 0.0, 1.0)) if last > 0 else 0.0
 
 
 def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
@@ -275,7 +280,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             # The others explain what it did, so what it explained is theirs.
             gone, newest = found.named.pop(k), found.named[-1] if found.named else None
             if newest is not None and k < len(found.named):
-                _inherit(newest, gone)
+                if set(added[k].lives_in) & set(added[-1].lives_in):
+                    _inherit(newest, gone)  # a law elsewhere cannot have explained it
                 if newest.name in gone.group:
                     # It was as good a name before, and neither is needed beside the other.
                     newest.group[gone.name] = 1.0
@@ -294,7 +300,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
             before = found.named[k]
-            own.gain, own.beyond, own.of_left = before.gain, before.beyond, before.of_left
+            own.gain, own.beyond = before.gain, before.beyond
+            own.of_left, own.of_lines = before.of_left, before.of_lines
             found.named[k] = own
         k += 1
     return current
