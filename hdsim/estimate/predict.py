@@ -21,6 +21,7 @@ from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.noise import noise_floor, quantisation_step, white_noise
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, signal, smoothed
+from hdsim.estimate.zeros import Zero, between_zeros
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
@@ -156,7 +157,11 @@ class Predictor:
 
     def __init__(self, record: Record, plan: Plan, ratio: float, rtol: float = RTOL) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
-        values = record.filled(plan.motion)
+        turns, self._zero = 0, 0.0
+        if plan.motion == "motor_angle" and "output_angle" in _readable(record) and not plan.locked:
+            turns, self._zero = between_zeros(record, ratio)
+        #: The prescribed reading, shape (n,), counted from the motor's zero that is next to the output's.
+        values = self._reading = record.filled(plan.motion) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         breaks, coefficients = smoothed(record.time, values, motion=not plan.locked)
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
@@ -209,7 +214,7 @@ class Predictor:
         """
         from scipy.interpolate import PPoly, make_lsq_spline
 
-        time, raw = self.record.time, self.record.filled(self.plan.motion)
+        time, raw = self.record.time, self._reading
         smooth = self.motor_angle / self._factor
         step = quantisation_step(raw[self.record.trusted[self.plan.motion]])
         # A loop's hiccup is no noise of the sensor: the median does not see it.
@@ -249,7 +254,7 @@ class Predictor:
         beside = max(beside, step / np.sqrt(12.0))
         if beside >= noise:
             return values, trusted, noise
-        return values - (motor - self.motor_angle) / self.ratio, both, float(beside)
+        return values - (self._reading - self.motor_angle) / self.ratio, both, float(beside)
 
     def predict(self, candidate: Candidate) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
@@ -270,6 +275,8 @@ class Predictor:
         elif load.torque is not None:
             # The scenario's load begins with the record, after the lead-in.
             parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(LEAD_IN_S))))
+        if self._zero:
+            parts.append(Zero(self._zero))
         motions: dict[str, Any] = {"motor": self.motion}
         if self.plan.locked == "output":
             motions["output"] = SignalData(Hold().move())
@@ -291,6 +298,8 @@ class Predictor:
             )
         except PhysicsError as error:
             raise PredictionError(str(error)) from None
+        for side in {"ring", "output"} & set(model.place_of):
+            model.system.y0[model.place_of[side]] = self._zero
         self.runs += 1
         asked = dict.fromkeys(self.plan.channels)
         if self._slow is not None:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from hdsim.diagnose.name import LEVEL
 from hdsim.diagnose.rules import RULES
+from hdsim.diagnose.screen import LEVEL
 from hdsim.diagnose.verdict import NamedEffect, Verdict
 from hdsim.estimate.found import FittedNumber
 from hdsim.tell.because import weighings
