@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -133,6 +133,7 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
     """All numbers fitted together, the base's and those of all effects.
 
     What the data did not determine while an effect was missing is asked again: it was drowned by that effect.
+    A sensor's sensitivity is not: it would bend to whatever is still missing, and is known beforehand.
 
     Args:
         bench: the measured series.
@@ -140,11 +141,14 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
         state: the model, where it has other effects than the fit's.
         rough: as in ``fit``.
     """
-    frees = [*at_present(found), *found.undetermined]
+    frees = [*at_present(found), *(free for free in found.undetermined if not free.reading)]
+    readings = replace(found, undetermined=[f for f in found.undetermined if f.reading], beside=None)
     # A number that a missing effect has driven to nearly nothing leaves no slope to come back by.
     far = {f.name: f.none for f in frees if not f.step and abs(f.none) > FAR * f.prior}
     begins = [None, far] if far else [None]
-    tried = [fit(bench, state or found.state, frees, theta=begin, rough=rough) for begin in begins]
+    tried = [
+        fit(bench, state or found.state, frees, theta=begin, after=readings, rough=rough) for begin in begins
+    ]
     whole = min(tried, key=lambda each: bench.power(each.predictions))
     if not rough:
         _widened(bench, whole)
