@@ -95,15 +95,17 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
     # still hold much of it leaves what the next one finds.
     reweigh(bench, found)
-    undetermined, ties = found.undetermined, found.ties
-    for _ in range(WEIGHINGS):
+    for weighing in range(WEIGHINGS):
         theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
-        slopes = found.columns, math.nan
-        found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes)
+        if weighing == 0 and found.undetermined:
+            # Far from the end, what the data see may look different from there.
+            found = fit(bench, state, [*found.frees, *found.undetermined], theta=theta)
+        else:
+            known = found.columns, math.nan
+            found = fit(bench, state, found.frees, theta=theta, prune=False, known=known, after=found)
         align(bench, found)
         if reweigh(bench, found) < ALIKE:
             break
-    found.undetermined, found.ties = undetermined, ties
     _widened(bench, found)
     late = with_delays(bench, found)
     noise = sum(bench.noise_powers.values())
@@ -158,9 +160,7 @@ def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:
     if not free or any(each.step for each in found.frees):
         return None
     frees = [*at_present(found), *free]
-    late = fit(bench, found.state, frees, prune=False, beside=found.beside, rough=rough)
-    late.undetermined, late.ties = found.undetermined, found.ties
-    return late
+    return fit(bench, found.state, frees, prune=False, after=found, rough=rough)
 
 
 def align(bench: Bench, found: Fit) -> None:

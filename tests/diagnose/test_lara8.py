@@ -3,7 +3,7 @@
 Same verdict means: what a base was given and what it is told to lack make up the same physics, whatever the
 base. The arm's weight is in the base, or it is named; an error of the output's own turn is named in all (of
 its encoder or of the gear: nothing in these data tells the two apart); the transmission error of orders 2 and
-1.98 is named, or stands among the located orders. Nothing else is named, and no number excludes what is known.
+1.98 is named, or stands among the located orders. Nothing else is named, no number excludes what is known.
 
 Friction stands in the base or is left: the joint starts once and stops once, the stop is held out, and one
 start does not tell friction from inertia, damping and delay at 2 %.
