@@ -99,9 +99,18 @@ def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
         of_left=max(one.of_left, one.of_lines) if added.lives_in[0] == SHARP else one.of_left,
         beyond=one.beyond,
         own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
+        own_first=_own_first(added, stages[-1].location),
         exact=catalogue()[one.name].signature.exact,
         at_limit=added.at_limit,
     )
+
+
+def _own_first(added: Added, location: Location) -> bool:
+    """Whether an effect's own coordinate holds more than any other of what is left in its channels."""
+    channels = catalogue()[added.effect].signature.channels
+    places = [place for place in location.places if place.channel in channels]
+    best = max(places, key=lambda place: place.share * location.powers[place.channel], default=None)
+    return best is None or best.coordinate == added.lives_in[0]
 
 
 def _own(added: Added, location: Location) -> float:

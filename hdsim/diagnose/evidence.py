@@ -79,6 +79,8 @@ class LawEvidence(Part):
     """Part of what its trace explains that no smooth curve over the others' coordinates can."""
     own_left: float = 0.0
     """Structure left in its own coordinate, as a part of what was there at first."""
+    own_first: bool = True
+    """Whether its own coordinate tells more than any other of what is left where it acts."""
     exact: bool = False
     """Whether its formula is exact, as statics are, and may leave nothing there."""
     at_limit: bool = False

@@ -12,6 +12,7 @@ from hdsim.diagnose.collect import collect
 from hdsim.diagnose.curve import CurveFit, fit_curve
 from hdsim.diagnose.decide import Decision, decide
 from hdsim.diagnose.evidence import Evidence
+from hdsim.diagnose.locate import SHARP
 from hdsim.diagnose.name import Named
 from hdsim.diagnose.remainder import remainder
 from hdsim.diagnose.rules import RULES
@@ -298,7 +299,7 @@ def _located(stages: Sequence[Stage], most: int = 6) -> list[Located]:
         best: dict[tuple[str, str], Located] = {}
         for place in stage.location.places:
             key = (place.coordinate, place.channel)
-            if key in best or place.share < 0.02 or len(best) >= most:
+            if key in best or place.share < 0.02 or (len(best) >= most and place.coordinate != SHARP):
                 continue
             orders = [line.order for line in stage.location.lines if line.channel == place.channel]
             best[key] = Located(
@@ -306,7 +307,7 @@ def _located(stages: Sequence[Stage], most: int = 6) -> list[Located]:
                 coordinate=place.coordinate,
                 channel=place.channel,
                 share=round(place.share, 4),
-                orders=orders if place.coordinate == "wave_generator_angle" else [],
+                orders=orders if place.coordinate == SHARP else [],
             )
         found += list(best.values())
     return found

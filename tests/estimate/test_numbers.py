@@ -37,6 +37,7 @@ run: {duration_s: 1.0}
 #: Units by the last part of a fitted field's path, by hand from what its docstring says.
 UNITS = {
     "amplitude_arcmin": "arcmin",
+    "amplitude_arcsec": "arcsec",
     "amplitude_nm": "N m",
     "back_driving_coefficient": "",
     "backlash_arcmin": "arcmin",

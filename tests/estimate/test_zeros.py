@@ -1,4 +1,4 @@
-"""Encoders whose zeros lie apart: weights are at the output's angles, wave generator's errors at the motor's."""
+"""Encoders whose zeros lie apart: weights at angles of the output, motor orders at angles of the motor."""
 
 import numpy as np
 import pytest
