@@ -20,7 +20,7 @@ import numpy as np
 from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.noise import noise_floor, quantisation_step, white_noise
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import SlowPart, signal, smoothed
+from hdsim.estimate.spline import SlowPart, least_squares_spline, signal, smoothed
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
@@ -207,7 +207,7 @@ class Predictor:
         Args:
             seed: of the draw.
         """
-        from scipy.interpolate import PPoly, make_lsq_spline
+        from scipy.interpolate import PPoly
 
         time, raw = self.record.time, self.record.filled(self.plan.motion)
         smooth = self.motor_angle / self._factor
@@ -222,7 +222,7 @@ class Predictor:
         knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
         found = copy(self)
         try:
-            pieces = PPoly.from_spline(make_lsq_spline(time, drawn, knots, k=3))
+            pieces = PPoly.from_spline(least_squares_spline(time, drawn, knots))
         except (ValueError, np.linalg.LinAlgError):
             return found  # a knot a sample, as of a motion without noise
         keep = np.diff(pieces.x) > 0
