@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hdsim.errors import InputError, PhysicsError
-from hdsim.estimate.noise import noise_floor, quantisation_step, white_noise
+from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, least_squares_spline, signal, smoothed
 
@@ -158,7 +158,9 @@ class Predictor:
         self.record, self.plan, self.rtol = record, plan, rtol
         values = record.filled(plan.motion)
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
-        breaks, coefficients = smoothed(record.time, values, motion=not plan.locked)
+        breaks, coefficients = smoothed(
+            record.time, values, motion=not plan.locked, step=self._step(plan.motion)
+        )
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
         self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
         coefficients = coefficients * self._factor
@@ -169,7 +171,8 @@ class Predictor:
         self.turn(0.0)
         self.load_torque: SignalData | None = None
         if plan.load != "scenario":
-            breaks, coefficients = smoothed(record.time, record.filled(plan.load))
+            step = self._step(plan.load)
+            breaks, coefficients = smoothed(record.time, record.filled(plan.load), step=step)
             sign = -1.0 if plan.load == "output_torque" else 1.0
             self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
         #: What a part may ask for beside the motion (``Builder.external``).
@@ -211,7 +214,7 @@ class Predictor:
 
         time, raw = self.record.time, self.record.filled(self.plan.motion)
         smooth = self.motor_angle / self._factor
-        step = quantisation_step(raw[self.record.trusted[self.plan.motion]])
+        step = self._step(self.plan.motion)
         # A loop's hiccup is no noise of the sensor: the median does not see it.
         rest = raw - smooth
         left = min(float(np.var(rest)), float(np.median(np.abs(rest)) / 0.6745) ** 2)
@@ -230,26 +233,43 @@ class Predictor:
         found.turn(0.0)
         return found
 
-    def measured(self, channel: str) -> tuple[Array, Mask, float]:
-        """What a predicted channel is compared with: readings (n,), which of them count (n,), their noise.
+    def _step(self, channel: str) -> float:
+        """Step of a channel's sensor, as it is felt in the record."""
+        raw, values = self.record.as_read, self.record.filled(channel)
+        good = raw.trusted[channel]
+        step = quantisation_step(raw.channels[channel][good])
+        return step_of_means(raw.channels[channel], good, step, values, self.record.readings)
+
+    def measured(self, channel: str) -> tuple[Array, Mask, float, float]:
+        """What a predicted channel is compared with.
 
         With both encoders the output's angle is read beside the motor's at the same moment: what a jittering
         clock, or the motor's encoder, puts on both falls out of their difference, the transmission error.
         Where that has less noise, the motor's reading less its smooth motion is taken out of the output's.
+
+        Returns:
+            Samples (n,), which of them count (n,), their noise, and that of a single reading.
         """
-        record = self.record
+        record, raw = self.record, self.record.as_read
         values, trusted = record.filled(channel), record.trusted[channel]
-        noise = noise_floor(record.channels[channel], trusted)
+        step = quantisation_step(raw.channels[channel][raw.trusted[channel]])
+
+        def noises(read: Array, good: Mask, step: float, means: Array, whole: Mask) -> tuple[float, float]:
+            single = noise_of_means(read, good, step, read, good, 1)
+            return noise_of_means(read, good, step, means, whole, record.readings), single
+
+        plain = noises(raw.channels[channel], raw.trusted[channel], step, values, trusted)
         if channel != "output_angle" or self.plan.motion != "motor_angle":
-            return values, trusted, noise
-        motor = record.filled("motor_angle")
-        both = trusted & record.trusted["motor_angle"]
-        beside = white_noise(values - motor / self.ratio, both)
-        step = max(quantisation_step(values[trusted]), quantisation_step(motor[both]) / abs(self.ratio))
-        beside = max(beside, step / np.sqrt(12.0))
-        if beside >= noise:
-            return values, trusted, noise
-        return values - (motor - self.motor_angle) / self.ratio, both, float(beside)
+            return values, trusted, *plain
+        motor, turned = record.filled("motor_angle"), raw.filled("motor_angle")
+        whole = trusted & record.trusted["motor_angle"]
+        good = raw.trusted[channel] & raw.trusted["motor_angle"]
+        step = max(step, quantisation_step(turned[good]) / abs(self.ratio))
+        read = raw.filled(channel) - turned / self.ratio
+        beside = noises(read, good, step, values - motor / self.ratio, whole)
+        if beside[0] >= plain[0]:
+            return values, trusted, *plain
+        return values - (motor - self.motor_angle) / self.ratio, whole, *beside
 
     def predict(self, candidate: Candidate) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
@@ -269,7 +289,8 @@ class Predictor:
             parts.append(MeasuredTorque(self.load_torque))
         elif load.torque is not None:
             # The scenario's load begins with the record, after the lead-in.
-            parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(LEAD_IN_S))))
+            late = LEAD_IN_S - self.record.begins_s
+            parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(late))))
         motions: dict[str, Any] = {"motor": self.motion}
         if self.plan.locked == "output":
             motions["output"] = SignalData(Hold().move())
