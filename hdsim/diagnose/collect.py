@@ -88,6 +88,9 @@ def _stage(stage: Stage) -> StageEvidence:
 
 def _law(one: Named, at_limit: bool, stages: Sequence[Stage]) -> LawEvidence:
     first, last = (_own(one.name, stage.location) for stage in (stages[0], stages[-1]))
+    # The stage that named it, or another that it has taken the place of.
+    began = next((s for s in stages if s.named is one), stages[0])
+    own = _own(one.name, began.location)
     return LawEvidence(
         name=one.name,
         group=list(one.group),
@@ -95,6 +98,7 @@ def _law(one: Named, at_limit: bool, stages: Sequence[Stage]) -> LawEvidence:
         sampled=one.confidence,
         gain=one.gain,
         of_left=one.of_left,
+        of_own=float(np.clip(1.0 - last / own, 0.0, 1.0)) if own > 0 else 0.0,
         beyond=one.beyond,
         own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
         exact=catalogue()[one.name].signature.exact,

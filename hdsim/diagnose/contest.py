@@ -201,7 +201,7 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             found.append(
                 fit(bench, state, frees, held_effects=held, prune=False, evaluations=ROUGH, theta=theta,
-                    beside=base.beside, known=(np.hstack([point.columns, columns]), power), rough=True)
+                    after=base, known=(np.hstack([point.columns, columns]), power), rough=True)
             )  # fmt: skip
     return found
 
@@ -215,7 +215,7 @@ def _fully(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
     held = len(base.state.added)
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         full = fit(bench, state, found.frees, held_effects=held, prune=False, evaluations=evaluations,
-                   theta=theta, beside=base.beside, known=known, rough=True)  # fmt: skip
+                   theta=theta, after=base, known=known, rough=True)  # fmt: skip
         return [full]
     return []
 

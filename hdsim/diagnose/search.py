@@ -135,6 +135,10 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         tell = during("again", "asking each name again beside the others")
         current = _again(bench, base, together(bench, current, rough=True), found, tell)
         align(bench, current)
+        # With the others beside it a name explains more than where it was tried with them held.
+        noise = sum(bench.noise_powers.values())
+        was, now = (bench.power(each.predictions) - noise for each in (found.fit, current))
+        named.of_left = max(named.of_left, float(np.clip((was - now) / was, 0.0, 1.0)) if was > 0 else 0.0)
         reweigh(bench, current)
     return current
 

@@ -21,6 +21,8 @@ def _elastic(drive: Drive) -> bool:
 
 #: Sections of the torsion spring: a catalogue's scatter is that of one casting, so they scale together.
 _STIFFNESS = Number(0.4, group="stiffness", compliance=True, matters=_elastic)
+#: Ends of its sections: knees that a table reads off a smooth curve, so known no better than the stiffness.
+_ENDS = Number(0.4, group="section_torques", matters=_elastic)
 #: Friction and damping differ more between two drives of a size, and with grease and temperature.
 _FRICTION = Number(0.7, far=15.0, may_vanish=True)
 _DAMPING = Number(1.0, matters=_elastic, far=15.0, may_vanish=True)
@@ -57,9 +59,9 @@ class Torsion(Parameters):
     """Secant stiffness from the first to the second torque, N m/rad."""
     stiffness_k3_nm_per_rad: Annotated[float, _STIFFNESS] = Field(gt=0)
     """Stiffness above the second torque, N m/rad."""
-    torque_t1_nm: float = Field(gt=0)
+    torque_t1_nm: Annotated[float, _ENDS] = Field(gt=0)
     """End of the first segment, N m."""
-    torque_t2_nm: float = Field(gt=0)
+    torque_t2_nm: Annotated[float, _ENDS] = Field(gt=0)
     """End of the second segment, N m."""
     wave_generator_stiffness_nm_per_rad: float | None = Field(None, gt=0)
     """Share of the chain that is the wave generator's bearing, as a stiffness at the output, N m/rad."""

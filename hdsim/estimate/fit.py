@@ -66,7 +66,7 @@ def fit(
     evaluations: int = EVALUATIONS,
     prune: bool = True,
     theta: Mapping[str, float] | None = None,
-    beside: tuple[Array, Array] | None = None,
+    after: Fit | None = None,
     known: tuple[Array, float] | None = None,
     rough: bool = False,
 ) -> Fit:
@@ -80,7 +80,7 @@ def fit(
         evaluations: residuals that the optimiser may ask for.
         prune: leave numbers that the data do not determine where they are.
         theta: where the logarithms of the base's factors start, by name; 0 by default.
-        beside: sensitivities to numbers that nobody knows, and their prior spreads; see ``Fit``.
+        after: an earlier fit whose undetermined numbers stay so, and widen the intervals of this one's.
         known: sensitivities near the start to the first numbers, shape (rows, up to p), and what one
             independent sample of the residual will count (or nan), where they are known.
         rough: the covariance is not needed, nor the sensitivities at the end.
@@ -89,15 +89,15 @@ def fit(
         PredictionError: the start itself could not be predicted.
     """
     chosen = list(frees)
-    undetermined: list[Free] = []
-    ties: dict[str, list[str]] = {}
+    undetermined, ties = (list(after.undetermined), dict(after.ties)) if after is not None else ([], {})
+    beside = after.beside if after is not None else None
     power = known[1] if known is not None else math.nan
     if prune and chosen:
         whole = Measured(bench, Vector(state, tuple(chosen), held_effects), theta)
         columns = whole.sensitivities(whole.start)
         split = determined(columns, whole.residual(whole.start), whole.priors, whole.blocks, len(chosen))
-        undetermined = [chosen[k] for k in split.dropped]
-        ties = {chosen[k].name: [chosen[j].name for j in tied] for k, tied in split.ties.items()}
+        undetermined += [chosen[k] for k in split.dropped]
+        ties |= {chosen[k].name: [chosen[j].name for j in tied] for k, tied in split.ties.items()}
         others = list(range(len(chosen), columns.shape[1]))
         known, power = (columns[:, split.kept + others], split.power), split.power
         chosen = [chosen[k] for k in split.kept]
@@ -109,7 +109,7 @@ def fit(
     start = problem.residual(x0)
     if len(x0) == 0:
         empty = np.zeros((len(start), 0))
-        return Fit(state, [], x0, np.zeros((0, 0)), predictions, empty, undetermined, ties)
+        return Fit(state, [], x0, np.zeros((0, 0)), predictions, empty, undetermined, ties, beside)
     if math.isnan(power):
         power = correlation(start, problem.blocks) * max(float(np.mean(start**2)), 1e-30)
     near = None
@@ -135,7 +135,7 @@ def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
     """A rough fit carried on to its very end, with the sensitivities and the covariance there."""
     known = found.columns, math.nan
     return fit(bench, found.state, at_present(found), held_effects=held_effects, prune=False,
-               evaluations=EVALUATIONS, beside=found.beside, known=known)  # fmt: skip
+               evaluations=EVALUATIONS, after=found, known=known)  # fmt: skip
 
 
 def sharpened(bench: Bench, found: Fit) -> Fit:

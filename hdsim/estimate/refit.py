@@ -95,15 +95,13 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
     # still hold much of it leaves what the next one finds.
     reweigh(bench, found)
-    undetermined, ties = found.undetermined, found.ties
     for _ in range(WEIGHINGS):
         theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
         slopes = found.columns, math.nan
-        found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes)
+        found = fit(bench, state, found.frees, theta=theta, prune=False, known=slopes, after=found)
         align(bench, found)
         if reweigh(bench, found) < ALIKE:
             break
-    found.undetermined, found.ties = undetermined, ties
     _widened(bench, found)
     late = with_delays(bench, found)
     noise = sum(bench.noise_powers.values())
@@ -158,9 +156,7 @@ def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:
     if not free or any(each.step for each in found.frees):
         return None
     frees = [*at_present(found), *free]
-    late = fit(bench, found.state, frees, prune=False, beside=found.beside, rough=rough)
-    late.undetermined, late.ties = found.undetermined, found.ties
-    return late
+    return fit(bench, found.state, frees, prune=False, after=found, rough=rough)
 
 
 def align(bench: Bench, found: Fit) -> None:

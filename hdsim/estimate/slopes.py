@@ -59,7 +59,7 @@ class Slopes:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(columns[:, seen] / lengths[seen], mode="r"))
         weak = np.zeros((int(np.sum(sizes < WEAK)), len(x)))
         weak[:, seen] = directions[sizes < WEAK] / lengths[seen]
-        most = problem.steps(x)
+        most = np.abs(problem.steps(x))
         steps = [d * float(np.min(most / np.maximum(np.abs(d), 1e-300))) for d in weak]
         changes = problem.changes([(x - d, x + d) for d in steps])
         for d, change in zip(steps, changes, strict=True):

@@ -15,8 +15,11 @@ from hdsim.estimate.state import State
 
 #: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which
 #: the model is further from linear; change of the whitened predictions, root mean square, for which a smaller
-#: step will do, and the smallest part of the largest step; times the step that a coefficient may go for that.
-STEP, SMALL_STEP, CHANGE, LEAST_STEP, MOST_STEP = 1e-1, 3e-2, 0.3, 3e-3, 10.0
+#: step will do (five times what the solver's own error can be), and the smallest part of the largest step;
+#: times the step that a coefficient may go for that.
+STEP, SMALL_STEP, CHANGE, LEAST_STEP, MOST_STEP = 1e-1, 3e-2, 0.03, 3e-3, 10.0
+#: Part of the largest step below which the wanted one is asked for anew.
+BENT = 0.1
 #: Prior spreads of an effect's coefficients (in units of their terms) and of what a fit moves of its shapes.
 COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
 #: Farthest that a fit moves a shape from where it starts.
@@ -117,7 +120,7 @@ class Vector:
         return lower, upper
 
     def steps(self, x: Array) -> Array:
-        """Steps of finite differences at ``x``, shape (p,)."""
+        """Steps of finite differences at ``x``, shape (p,): back from an end that a number stands at."""
         own = np.array([SMALL_STEP if free.compliance else STEP for free in self.frees])
         steps = (own / self.rates(x)).tolist()
         at = len(self.frees)
@@ -125,7 +128,8 @@ class Vector:
             steps += [SMALL_STEP * max(1.0, abs(v)) for v in x[at : at + len(added.coefficients)]]
             steps += [SMALL_STEP] * len(added.shapes)
             at += len(added.coefficients) + len(added.shapes)
-        return np.array(steps)
+        sizes = np.array(steps)
+        return np.asarray(np.where(x + sizes > self.bounds()[1], -sizes, sizes))
 
 
 class Measured:
@@ -211,24 +215,42 @@ def sensitivities(
         predictions = bench.predict(here)
     steps = vector.steps(x)
     if like is not None:
-        size = np.sqrt(np.mean(like**2, axis=0))
-        # Effects are linear in their coefficients, so those may move further.
-        kinds = vector.coefficients()[: len(size)]
-        wanted = CHANGE / np.maximum(size * steps[: len(size)], 1e-300)
-        steps[: len(size)] *= np.clip(wanted, LEAST_STEP, np.where(kinds, MOST_STEP, 1.0))
-    steps = steps[first:]
-    states = []
-    for k, step in enumerate(steps, start=first):
-        shifted = x.copy()
-        shifted[k] += step
-        states.append(vector.state(shifted))
+        steps *= _shorter(like, steps, vector)
+    columns = _differences(bench, vector, x, predictions, steps, range(first, len(x)))
+    if like is None:
+        # Secants of changes that are far above the noise show the model's bend, not its slope.
+        factors = _shorter(columns, steps[first:], vector, first)
+        bent = [k for k in range(first, len(x)) if factors[k - first] < BENT]
+        steps[bent] *= factors[[k - first for k in bent]]
+        columns[:, [k - first for k in bent]] = _differences(bench, vector, x, predictions, steps, bent)
+    return columns
+
+
+def _shorter(like: Array, steps: Array, vector: Vector, first: int = 0) -> Array:
+    """Factors of finite differences' steps for a change that stands out from the solver's noise, no larger.
+
+    Effects are linear in their coefficients, so those may move further.
+    """
+    own = slice(first, first + like.shape[1])
+    factors = np.ones(len(steps))
+    size = np.sqrt(np.mean(like**2, axis=0)) * np.abs(steps[: like.shape[1]])
+    most = np.where(vector.coefficients()[own], MOST_STEP, 1.0)
+    factors[: like.shape[1]] = np.clip(CHANGE / np.maximum(size, 1e-300), LEAST_STEP, most)
+    return factors
+
+
+def _differences(
+    bench: Bench, vector: Vector, x: Array, predictions: list[Array], steps: Array, wanted: Sequence[int]
+) -> Array:
+    """Whitened finite differences of the wanted numbers, shape (rows, len(wanted))."""
+    here = vector.state(x)
+    states = [vector.state(x + steps[k] * (np.arange(len(x)) == k)) for k in wanted]
     # How a channel is read needs no simulation.
-    read = [k < len(vector.frees) and vector.frees[k].reading for k in range(first, len(x))]
+    read = [k < len(vector.frees) and vector.frees[k].reading for k in wanted]
     simulated = iter(bench.predict_all([s for s, only in zip(states, read, strict=True) if not only]))
-    rows = len(bench.stacked_blocks())
-    columns = np.zeros((rows, len(steps)))
-    for k, (state, only, step) in enumerate(zip(states, read, steps, strict=True)):
+    columns = np.zeros((len(bench.stacked_blocks()), len(states)))
+    for at, (k, state, only) in enumerate(zip(wanted, states, read, strict=True)):
         there = bench.reread(predictions, here, state) if only else next(simulated)
         if there is not None:
-            columns[:, k] = bench.trace(predictions, there) / step
+            columns[:, at] = bench.trace(predictions, there) / steps[k]
     return columns
