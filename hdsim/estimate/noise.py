@@ -61,8 +61,8 @@ def noise_of_means(
 ) -> float:
     """Standard deviation of the noise on means of successive readings, in their unit.
 
-    White noise falls with the root of their number; noise that is not white by less, as differences of the means
-    tell, and none rises.
+    White noise falls with the root of their number; noise that is not white by less, as differences of the
+    means tell, and none rises.
 
     Args:
         values: shape (n,), as read.

@@ -21,8 +21,6 @@ TAIL_S = 0.02
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
 #: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
 STEPS_ALLOW = 1.1
-#: Samples in which it is asked how many knots a stretch needs: more than between the coarsest that it may get.
-WINDOW = 120
 #: Part of its own size that the other splines leave of a B-spline, squared, below which rounding decides.
 SINGULAR = 1e-12
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
@@ -37,8 +35,7 @@ def smoothed(
     Generalised cross-validation (Craven and Wahba 1979, Numerische Mathematik 31:377) of uniform
     least-squares splines: coarse knots when the data are noisy, the interpolating spline when they are not.
     The steps of a quantised reading are no white noise, and fine knots would follow them: of the splines that
-    leave no more than the steps allow, q / sqrt(12), the coarsest is taken where it is coarser. Where the course
-    is calmer than elsewhere its knots are taken out, for each costs a prediction at least a step.
+    leave no more than the steps allow, q / sqrt(12), the coarsest is taken where it is coarser.
 
     Args:
         time: shape (n,), s, strictly increasing.
@@ -56,8 +53,6 @@ def smoothed(
         jumping = _jumping(time, values, chosen)
         if jumping is not None and _score(time, values, jumping) < best:
             chosen = jumping
-    sparser = _sparser(time, values, chosen, quantisation_step(values) if step is None else step)
-    chosen = sparser or chosen
     pieces_of = PPoly.from_spline(chosen)
     keep = np.diff(pieces_of.x) > 0
     breaks = np.concatenate([pieces_of.x[:-1][keep], [time[-1]]])
@@ -122,61 +117,6 @@ def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[
     if coarse is not None and chosen is not None and len(coarse[1].c) < len(chosen.c):
         return coarse
     return best, chosen
-
-
-def _sparser(time: Array, values: Array, spline: BSpline, step: float) -> BSpline | None:
-    """The spline without the knots that it does not need; None where it needs about all.
-
-    In each window of time, and its neighbours, the coarsest uniform knots whose score there is within one standard
-    error of that of the spline (the rule of Breiman, Friedman, Olshen and Stone 1984, Classification and
-    Regression Trees, section 3.4.3), or that leave no more than the steps of the sensor allow. Double knots stay,
-    with those around them.
-
-    Args:
-        time: shape (n,).
-        values: shape (n,).
-        spline: uniform, but for double knots.
-        step: q of the sensor.
-    """
-    n, knots = len(time), spline.t[4:-4]
-    if len(knots) < 4 or n < 3 * WINDOW:
-        return None
-    at = np.interp(knots, time, np.arange(n))
-    own = float(np.median(np.diff(at)))
-    starts = np.arange(0, n - WINDOW + 1, WINDOW)  # the last one is longer
-    counts = np.diff(np.append(starts, n))
-    window = np.minimum((at / WINDOW).astype(int), len(starts) - 1)
-
-    def left(candidate: BSpline) -> Array:
-        return np.add.reduceat((values - candidate(time)) ** 2, starts) / counts
-
-    most = left(spline) / (1.0 - 1.0 / own) ** 2 * (1.0 + np.sqrt(2.0 / counts))
-    allowed = STEPS_ALLOW**2 * step**2 / 12.0
-    found, calm = np.full(len(starts), own), np.ones(len(starts), dtype=bool)
-    calm[window[1:][np.diff(at) < 0.1 * own]] = False
-    for spacing in (s for s in SPACINGS if 1.2 * own < s < WINDOW):
-        uniform = _uniform(time, values, spacing)
-        if uniform is None:
-            break
-        rest = left(uniform)
-        calm &= (rest / (1.0 - 1.0 / spacing) ** 2 <= most) | (rest <= allowed)
-        found[calm] = spacing
-    padded = np.concatenate([found[:1], found, found[-1:]])
-    found = np.minimum(np.minimum(padded[:-2], padded[2:]), found)
-    inner = [at[found[window] == own]]
-    for begin, count, spacing in zip(starts, counts, found, strict=True):
-        if spacing > own:
-            inner.append(begin + spacing * (0.5 + np.arange(int(count / spacing))))
-    places = np.interp(np.sort(np.concatenate(inner)), np.arange(n), time)
-    if len(places) > 0.9 * len(knots):
-        return None
-    try:
-        fewer = least_squares_spline(time, values, np.concatenate([spline.t[:4], places, spline.t[-4:]]))
-    except (ValueError, np.linalg.LinAlgError):
-        return None
-    best = _score(time, values, spline) * (1.0 + np.sqrt(2.0 / n))
-    good = _score(time, values, fewer) <= best or np.mean((values - fewer(time)) ** 2) <= allowed
-    return fewer if good else None
 
 
 def _uniform(time: Array, values: Array, spacing: float) -> BSpline | None:

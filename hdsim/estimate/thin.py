@@ -20,8 +20,9 @@ COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 #: Samples that are left of all records together: the most blocks of time that are told apart, 90, of about 90
 #: samples each. The cost of a diagnosis is in proportion to them.
 ENOUGH = 8000
-#: Part of the noise's power that may be lost beside it: an effect has to explain as much of what is left to be
-#: named. White noise, by pairs of readings over by differences of high order, both squared, is white up to this.
+#: Part of the noise's power that may be lost beside it: an effect has to explain as much of what is left to
+#: be named. Noise by pairs of readings over noise by differences of high order, both squared, up to which it
+#: counts as white: the estimates differ by up to 20 % where it is, and by 70 % and more on real machines.
 OF_NOISE, WHITE = 0.03, 1.25
 #: Readings of a mean that loses so little, over those of the mean that is taken: near their own limit means
 #: no longer tell the course between them.

@@ -52,7 +52,11 @@ def test_what_is_fixed_stays_and_what_is_asked_for_moves(tmp_path):
     assert found.fit.state.drive.torsion.stiffness_k2_nm_per_rad == 3.0e3
     assert found.fit.state.drive.torsion.stiffness_k1_nm_per_rad != 3.0e3
     section = "drive.torsion"
-    others = [*(k1.replace("k1", k) for k in ("k2", "k3")), f"{section}.torque_t1_nm", f"{section}.torque_t2_nm"]
+    others = [
+        *(k1.replace("k1", k) for k in ("k2", "k3")),
+        f"{section}.torque_t1_nm",
+        f"{section}.torque_t2_nm",
+    ]
     for bad, message in (
         ({"free": ["drive.friction.no_such"]}, "drive.friction.no_such: no number"),
         ({"fix": ["load.gravity"]}, "load.gravity: no number"),
