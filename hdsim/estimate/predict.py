@@ -21,6 +21,7 @@ from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, least_squares_spline, signal, smoothed
+from hdsim.estimate.unloaded import unloaded_angle
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
@@ -101,7 +102,7 @@ def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked =
     Raises:
         InputError: nothing can be predicted; the message names what is missing.
     """
-    has = _readable(record)
+    has = record.readable
     moving = {c for c in has if float(np.ptp(record.filled(c))) > 0}
     if load is None:
         load = "load_torque" if "load_torque" in moving else "scenario"
@@ -126,11 +127,6 @@ def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked =
             "motor_torque, output_torque or (with motor_angle) output_angle must be measured and vary"
         )
     return Plan(motion, load, tuple(predicted), locked)
-
-
-def _readable(record: Record) -> set[str]:
-    """Channels with more than a few readings that can be trusted."""
-    return {c for c, good in record.trusted.items() if good.sum() > 20}
 
 
 def _motor_locked(record: Record, moving: set[str]) -> Plan:
@@ -177,7 +173,7 @@ class Predictor:
             self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
         #: What a part may ask for beside the motion (``Builder.external``).
         self.signals: dict[str, SignalData] = {}
-        if "temperature" in _readable(record):
+        if "temperature" in record.readable:
             found = smoothed(record.time, record.filled("temperature"))
             self.signals["temperature"] = signal(*found, LEAD_IN_S)
         self._slow: SlowPart | None = None
@@ -330,23 +326,6 @@ class Predictor:
                 own = own - self._slow.of(own) if np.any(own) else own
                 found["output_torque"] = self._slow_torque + own
         return found
-
-
-def unloaded_angle(record: Record, angle: Array) -> float:
-    """Motor angle of a locked drive midway between its branches at zero torque, rad (0 without a torque).
-
-    Args:
-        record: the measured run.
-        angle: motor angle beside the output, shape (n,).
-    """
-    for channel in ("motor_torque", "output_torque"):
-        if channel in _readable(record):
-            torque = record.filled(channel)
-            small = np.abs(torque) < 0.05 * np.max(np.abs(torque))
-            if small.any():
-                low, high = np.quantile(angle[small], [0.05, 0.95])
-                return float(0.5 * (low + high))
-    return 0.0
 
 
 class PredictionError(ArithmeticError):

@@ -81,6 +81,11 @@ class Record:
         """The record before any means were taken."""
         return self.source or self
 
+    @property
+    def readable(self) -> set[str]:
+        """Channels with more than a few readings that can be trusted."""
+        return {c for c, good in self.trusted.items() if good.sum() > 20}
+
     def filled(self, channel: str) -> Array:
         """A channel with untrusted samples replaced by linear interpolation, shape (n,)."""
         good = self.trusted[channel]
