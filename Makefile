@@ -17,7 +17,7 @@ help:
 	@echo "make lock       resolve the development set anew (needs uv)"
 	@echo "make schema     write scenarios/scenario.schema.json anew"
 	@echo "make blind      hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
-	@echo "make picture    draw docs/images/seed_move.png anew"
+	@echo "make picture    draw docs/images/seed_move.png and diagnose_report.webp anew (the latter needs Chromium)"
 	@echo "make clean      remove $(VENV), caches and logs"
 
 setup: $(STAMP)
@@ -58,6 +58,7 @@ blind: $(STAMP)
 
 picture: run
 	cp logs/seed_move.png docs/images/seed_move.png
+	$(BIN)/python docs/images/diagnose_report.py
 
 clean:
 	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from hdsim.contact import tabulate
-from hdsim.drive import _mesh
+from hdsim.drive import _mesh_layout
 
 
 def sine(signal, quantity, unit):
@@ -64,7 +64,11 @@ class NumpyDrive:
         self.energy_cells = np.ascontiguousarray(table.coefficients[:, [4, 0, 1, 2, 3]]) / [1, 1, 2, 3, 4]
         # Cup.
         p = teeth.parameters
-        at, cells, step = int(p[_mesh.SPRING_AT]), int(p[_mesh.SPRING_CELLS]), p[_mesh.SPRING_STEP]
+        at, cells, step = (
+            int(p[_mesh_layout.SPRING_AT]),
+            int(p[_mesh_layout.SPRING_CELLS]),
+            p[_mesh_layout.SPRING_STEP],
+        )
         cup = p[at : at + 5 * cells].reshape(cells, 5)[:, 3::-1].T
         self.cup = PPoly(cup, step * np.arange(cells + 1))
 

@@ -119,6 +119,6 @@ def system(function: Callable[..., None]) -> Kernel:
     """Declare ``f(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt)``: an ODE y' = f(t, y).
 
     ``jacobian`` is n by n, row-major, set only when ``want_jacobian`` is not 0, ``dfdt`` likewise.
-    The last ``quadratures`` states (see ``hdsim.simulation.system``) may not appear in any right-hand side.
+    The last ``quadratures`` states (see ``hdsim.system``) may not appear in any right-hand side.
     """
     return Kernel(function, "system")

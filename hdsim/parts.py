@@ -185,9 +185,11 @@ class Effect(Part):
         signature: the trace it leaves in measured data.
         number: what its numbers say to a fit where a field's annotation (``hdsim.number``) says nothing else:
             a source's number is often another machine's.
+        several: whether its fittings are errors of different things, one beside the other.
     """
 
     title: ClassVar[str]
     source: ClassVar[str]
     signature: ClassVar[Signature]
     number: ClassVar[Number] = Number(0.7, far=15.0, may_vanish=True)
+    several: ClassVar[bool] = False

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, cast
 from pydantic import Field, ValidationError, create_model, model_validator
 from pydantic.fields import FieldInfo
 
-from hdsim.actuation import shapes
+from hdsim.actuation import shapes, waves
 from hdsim.actuation.signal_data import SignalData
 from hdsim.errors import InputError
 from hdsim.parts import Parameters
@@ -54,10 +54,10 @@ _ANY: dict[str, Any] = {
     "hold": shapes.Hold,
     "step": shapes.Step,
     "ramp": shapes.Ramp,
-    "sine": shapes.Sine,
-    "chirp": shapes.Chirp,
-    "multisine": shapes.Multisine,
-    "triangle": shapes.Triangle,
+    "sine": waves.Sine,
+    "chirp": waves.Chirp,
+    "multisine": waves.Multisine,
+    "triangle": waves.Triangle,
     "recorded": shapes.Recorded,
 }
 

@@ -14,7 +14,7 @@ from hdsim.diagnose.evidence import (
     RestEvidence,
     StageEvidence,
 )
-from hdsim.diagnose.locate import Location
+from hdsim.diagnose.locate import SHARP, Location
 from hdsim.diagnose.name import Named
 from hdsim.diagnose.search import Search, Stage
 from hdsim.effects import catalogue
@@ -23,6 +23,7 @@ from hdsim.estimate.found import Gap
 from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import Refit
+from hdsim.estimate.state import Added
 
 #: Places of a stage that are kept.
 PLACES = 12
@@ -51,7 +52,7 @@ def collect(
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
         laws=[
-            _law(one, added.at_limit, found.stages)
+            _law(one, added, found.stages)
             for one, added in zip(found.named, found.fit.state.added, strict=True)
         ],
         explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
@@ -86,32 +87,29 @@ def _stage(stage: Stage) -> StageEvidence:
     )
 
 
-def _law(one: Named, at_limit: bool, stages: Sequence[Stage]) -> LawEvidence:
-    first, last = (_own(one.name, stage.location) for stage in (stages[0], stages[-1]))
-    # The stage that named it, or another that it has taken the place of.
-    began = next((s for s in stages if s.named is one), stages[0])
-    own = _own(one.name, began.location)
+def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
+    first, last = (_own(added, stage.location) for stage in (stages[0], stages[-1]))
     return LawEvidence(
         name=one.name,
         group=list(one.group),
         chance=one.chance,
         sampled=one.confidence,
         gain=one.gain,
-        of_left=one.of_left,
-        of_own=float(np.clip(1.0 - last / own, 0.0, 1.0)) if own > 0 else 0.0,
+        # Sharp lines are no part of what smooth effects have left.
+        of_left=max(one.of_left, one.of_lines) if added.lives_in[0] == SHARP else one.of_left,
         beyond=one.beyond,
         own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
         exact=catalogue()[one.name].signature.exact,
-        at_limit=at_limit,
+        at_limit=added.at_limit,
     )
 
 
-def _own(name: str, location: Location) -> float:
+def _own(added: Added, location: Location) -> float:
     """Whitened power of a residual that lives in an effect's own coordinate, in its channels."""
-    signature = catalogue()[name].signature
+    signature = catalogue()[added.effect].signature
     found: dict[str, float] = {}
     for place in location.places:
-        if place.coordinate == signature.lives_in[0] and place.channel in signature.channels:
+        if place.coordinate == added.lives_in[0] and place.channel in signature.channels:
             power = place.share * location.powers[place.channel]
             found[place.channel] = max(found.get(place.channel, 0.0), power)
     return sum(found.values())

@@ -125,14 +125,11 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
         ("held-out data show the promised change", evidence.held.slope, min(held, 0.0) if k else held),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
-    left = law.own_left
-    if law.exact:
-        left = evidence.left if evidence.left_chance <= rules.chance else 0.0
     found.append(
         (
             "part of the structure in its own coordinate that it leaves",
-            left,
-            (rules.own_left_exact if law.exact else rules.own_left) * left,
+            law.own_left,
+            (rules.own_left_exact if law.exact else rules.own_left) * law.own_left,
         )
     )
     if law.at_limit:

@@ -18,6 +18,8 @@ from hdsim.estimate.records import Array
 CORNERS, FINE_CORNERS = 9, 40
 #: Orders per wave-generator turn that are always tried: integers; with 2 z_c / z_f and its double.
 LOBES = (1.0, 2.0, 3.0, 4.0)
+#: The coordinate whose sharp lines no smooth curve over another one holds.
+SHARP = "wave_generator_angle"
 
 
 @dataclass
@@ -37,12 +39,14 @@ class Place:
         channel: the channel.
         share: cross-validated share of the residual's power.
         curve: the function, where the coordinate is one number.
+        chance: probability of such a share in a residual without structure.
     """
 
     coordinate: str
     channel: str
     share: float
     curve: Curve | None = None
+    chance: float = 1.0
 
 
 @dataclass
@@ -62,6 +66,10 @@ class Location:
     structured: float = 0.0
     chance: float = 1.0
     powers: dict[str, float] = field(default_factory=dict)
+
+    def sharp(self, level: float) -> bool:
+        """Whether some channel holds lines over the wave generator's angle with at most this chance."""
+        return any(place.coordinate == SHARP and place.chance <= level for place in self.places)
 
 
 def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location:
@@ -93,7 +101,8 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
             if corners is not None:
                 sigma = float(np.mean([bench.series[k].sigma for k in own]))
                 curve = Curve(corners, share.coefficients[: len(corners)] * sigma)
-            found.places.append(Place(name, channel, share.share, curve))
+            chance = float((1 + np.sum(share.chance >= share.share)) / (1 + len(share.chance)))
+            found.places.append(Place(name, channel, share.share, curve, chance))
             best = max(best, share.share)
             channel_draws.append(share.chance)
         explained += best * power
@@ -122,7 +131,7 @@ def curves_over(bench: Bench, residuals: Sequence[Array], wanted: Collection[tup
         if not names:
             continue
         own = [k for k, s in enumerate(bench.series) if s.channel == channel and s.record < bench.training]
-        lines = order_lines(bench, residuals, channel) if "wave_generator_angle" in names else []
+        lines = order_lines(bench, residuals, channel) if SHARP in names else []
         columns += [x for name, x, _ in _designs(bench, own, lines, residuals) if name in names]
     return np.hstack(columns)
 
@@ -166,7 +175,7 @@ def _designs(
     turning = [*(n * angle for n in LOBES), 2.0 * relative, 4.0 * relative]
     turning += [line.order * angle for line in lines if line.order not in LOBES]
     harmonics = np.column_stack([part for a in turning for part in (np.sin(a), np.cos(a))])
-    result.append(("wave_generator_angle", _placed(bench, own, harmonics), None))
+    result.append((SHARP, _placed(bench, own, harmonics), None))
     return result
 
 

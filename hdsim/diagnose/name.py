@@ -19,8 +19,6 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.records import Array
 
-#: Largest chance at which a search may name an effect.
-LEVEL = 0.02
 #: Least share of the weighed residual that an effect must explain to be worth a name.
 LEAST_SHARE = 0.03
 #: Candidates that are fitted roughly, and the part of the best share that they must reach on the screen.
@@ -64,6 +62,7 @@ class Named:
         alternatives: fits of the others on the shortlist, carried on to their optimum but not proved there.
         candidates: all that were fitted, the best first, as evidence.
         of_left: part of what was left beyond the noise that its fit explained; likewise.
+        of_lines: part of the sharp lines that were left that it explained, where it lives there; likewise.
         gain: part of the first pass's structure that it explained; set by the search.
         beyond: part of its trace's share that curves over the others' coordinates leave it; likewise.
     """
@@ -80,6 +79,7 @@ class Named:
     gain: float = 1.0
     beyond: float = 1.0
     of_left: float = 1.0
+    of_lines: float = 0.0
 
 
 def name_effect(
@@ -222,9 +222,9 @@ def simplest_first(results: list[tuple[str, Fit, Array]], same: float) -> list[t
 
 
 def freedom(found: Fit) -> int:
-    """Free numbers of a fit's last effect."""
+    """Free numbers of a fit's last effect; orders that are read from the data are, too."""
     added = found.state.added[-1]
-    return len(added.coefficients) + len(added.shapes)
+    return len(added.coefficients) + len(added.shapes) + len(added.orders)
 
 
 def confusable(one: str, other: str) -> bool:

@@ -73,21 +73,17 @@ def order_lines(bench: Bench, residuals: Sequence[Array], channel: str, most: in
         k = int(np.argmax(shares))
         if shares[k] < max(LEAST_LINE, 10.0 * float(np.median(shares))):
             break
-        order = _refined(theta, rest, float(orders[k]), step)
-        whole = round(order)
-        if whole >= 1 and abs(order - whole) <= 0.5 / turns:
-            order = float(whole)
-        lines.append(Line(channel, order, 2.0 * abs(np.mean(rest * np.exp(-1j * order * theta))), shares[k]))
+        found = [*(line.order for line in lines), _refined(theta, rest, float(orders[k]), step)]
+        # Lines that are close pull at one another, so each is refined beside all others.
+        for j in range(len(found) if len(found) > 1 else 0):
+            alone, _ = _without(theta, e, found[:j] + found[j + 1 :])
+            found[j] = _refined(theta, alone, found[j], 0.25 / turns)
+        found = [_whole(order, turns) for order in found]
         # The next one is looked for in what all lines so far leave, so that no side lobe is taken for a line.
-        angles = np.outer(theta, [line.order for line in lines])
-        columns = np.hstack([np.sin(angles), np.cos(angles)])
-        fitted, *_ = np.linalg.lstsq(columns, e, rcond=None)
-        rest = e - columns @ fitted
-        half = len(lines)
-        sizes = np.hypot(fitted[:half], fitted[half:])
+        rest, sizes = _without(theta, e, found)
         lines = [
-            Line(channel, line.order, float(size), float(0.5 * size**2 / power))
-            for line, size in zip(lines, sizes, strict=True)
+            Line(channel, order, float(size), float(0.5 * size**2 / power))
+            for order, size in zip(found, sizes, strict=True)
         ]
     return sorted(lines, key=lambda line: -line.share)
 
@@ -97,3 +93,37 @@ def _refined(theta: Array, e: Array, order: float, step: float) -> float:
     fine = order + step * np.linspace(-1.0, 1.0, 21)
     power = [abs(np.mean(e * np.exp(-1j * n * theta))) for n in fine]
     return float(fine[int(np.argmax(power))])
+
+
+def power_of(bench: Bench, residuals: Sequence[Array], lines: Sequence[Line]) -> float:
+    """Whitened power that least squares finds at the orders of some lines in their channels' residuals.
+
+    Args:
+        bench: the measured series.
+        residuals: of every series, SI units.
+        lines: peaks of order spectra.
+    """
+    total = 0.0
+    for series, residual in zip(bench.series, residuals, strict=True):
+        orders = [line.order for line in lines if line.channel == series.channel]
+        if not orders or not len(residual) or not series.train.any():
+            continue
+        own = residual[series.train] / series.sigma
+        theta = bench.predictors[series.record].motor_angle[series.train]
+        left, _ = _without(theta, own - own.mean(), orders)
+        total += float(np.sum((own - own.mean()) ** 2) - np.sum(left**2))
+    return total
+
+
+def _whole(order: float, turns: float) -> float:
+    """The whole number next to an order, where the record is too short to tell it from that."""
+    whole = round(order)
+    return float(whole) if whole >= 1 and abs(order - whole) <= 0.5 / turns else order
+
+
+def _without(theta: Array, e: Array, orders: Sequence[float]) -> tuple[Array, Array]:
+    """What least squares leaves beside sines of these orders, and their amplitudes."""
+    angles = np.outer(theta, orders)
+    columns = np.hstack([np.sin(angles), np.cos(angles)])
+    fitted, *_ = np.linalg.lstsq(columns, e, rcond=None)
+    return e - columns @ fitted, np.hypot(fitted[: len(orders)], fitted[len(orders) :])

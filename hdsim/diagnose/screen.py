@@ -23,8 +23,9 @@ from hdsim.estimate.records import Array
 
 #: Folds of the cross-validation, and blocks that stay together in a fold.
 FOLDS, TOGETHER = 5, 2
-#: Draws of the wild bootstrap.
+#: Draws of the wild bootstrap, and the largest chance at which a search may name an effect.
 DRAWS = 400
+LEVEL = 0.02
 
 
 @dataclass

@@ -13,16 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdsim.diagnose.locate import Location, curves_over, locate
-from hdsim.diagnose.name import (
-    LEAST_SHARE,
-    LEVEL,
-    SAME,
-    Named,
-    name_effect,
-)
-from hdsim.diagnose.orders import Line, order_lines
-from hdsim.diagnose.screen import Residual
+from hdsim.diagnose.locate import SHARP, Location, curves_over, locate
+from hdsim.diagnose.name import LEAST_SHARE, SAME, Named, name_effect
+from hdsim.diagnose.orders import Line, order_lines, power_of
+from hdsim.diagnose.screen import LEVEL, Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
@@ -118,7 +112,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
-    if found.named and not _more_could(bench, base, current):
+    if found.named and not (stage.location.sharp(LEVEL) or _more_could(bench, base, current)):
         return None
     for beyond in (True, False) if found.named else (False,):
         named = _one_more(bench, base, current, found, stage, beyond, during)
@@ -128,12 +122,17 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     stage.named = named
     found.named.append(named)
-    current = named.fit if len(found.named) > 1 else sharpened(bench, named.fit)
+    current = named.fit
+    if len(found.named) == 1:
+        # A base that carried nothing could tell nothing of its springs.
+        current = together(bench, current, rough=True) if current.undetermined else current
+        current = sharpened(bench, current)
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
         tell = during("again", "asking each name again beside the others")
         current = _again(bench, base, together(bench, current, rough=True), found, tell)
+        current = sharpened(bench, current)
         align(bench, current)
         # With the others beside it a name explains more than where it was tried with them held.
         noise = sum(bench.noise_powers.values())
@@ -157,7 +156,7 @@ def _one_more(
     No formula is ever exact, and what the present ones leave in their own coordinates would be taken for
     another effect. An effect that shows there only must explain much more.
     """
-    left = beyond_curves(bench, current, found.left, found.named) if beyond else found.left
+    left = beyond_curves(bench, current, found.left) if beyond else found.left
     places = stage.location.places
     if stage.screening is None:
         tell = during("screen", "screening the catalogue")
@@ -183,20 +182,47 @@ def _one_more(
     named.beyond = float(np.clip(alone.share.share * left.power / own, 0.0, 1.0)) if own > 0 else 0.0
     named.gain = _gain(bench, base, current, named.fit)
     named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
+    sharp = named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL)
+    if found.named and sharp:
+        # Lines stand out of what is left, however little they are beside what was missing and what still is.
+        named.of_lines = _of_lines(bench, current, named.fit, stage.location.lines)
+        return named
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
     return named if named.gain >= least else None
 
 
-def beyond_curves(bench: Bench, current: Fit, left: Residual, named: Sequence[Named]) -> Residual:
-    """A residual without what smooth curves over the coordinates of the named effects explain."""
+def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
+    """A residual without what smooth curves over the coordinates of the added effects explain.
+
+    An exact formula leaves nothing there: what is left in its coordinate is another's.
+    """
     homes = {
         (coordinate, channel)
-        for one in named
-        for coordinate in catalogue()[one.name].signature.lives_in
-        for channel in bench.channels
+        for one, channels in zip(current.state.added, shown_in(bench, current), strict=True)
+        if not catalogue()[one.effect].signature.exact
+        for coordinate in one.lives_in
+        for channel in channels
     }
     curves = curves_over(bench, bench.residuals(current.predictions), homes)
     return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
+
+
+def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
+    """Channels in which each added effect shows more than the noise: in others it can leave nothing."""
+    numbers, noise = bench.stacked_series(), bench.noise_powers
+    at, found = len(current.frees), []
+    for added in current.state.added:
+        columns = current.columns[:, at : at + len(added.coefficients)]
+        powers = (columns @ np.array(added.coefficients)) ** 2
+        at += len(added.coefficients) + len(added.shapes)
+        own = {
+            channel: sum(
+                float(powers[numbers == k].sum()) for k, s in enumerate(bench.series) if s.channel == channel
+            )
+            for channel in bench.channels
+        }
+        found.append([channel for channel in bench.channels if own[channel] > noise[channel]])
+    return found
 
 
 def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
@@ -204,6 +230,12 @@ def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
     first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
     noise = bench.noise_powers
     return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
+
+
+def _of_lines(bench: Bench, before: Fit, now: Fit, lines: Sequence[Line]) -> float:
+    """Part of the lines of what was left that a fit explains."""
+    last, new = (power_of(bench, bench.residuals(each.predictions), lines) for each in (before, now))
+    return float(np.clip(1.0 - new / last, 0.0, 1.0)) if last > 0 else 0.0
 
 
 def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
@@ -252,7 +284,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
             # The others explain what it did, so what it explained is theirs.
             gone, newest = found.named.pop(k), found.named[-1] if found.named else None
             if newest is not None and k < len(found.named):
-                _inherit(newest, gone)
+                if set(added[k].lives_in) & set(added[-1].lives_in):
+                    _inherit(newest, gone)  # a law elsewhere cannot have explained it
                 if newest.name in gone.group:
                     # It was as good a name before, and neither is needed beside the other.
                     newest.group[gone.name] = 1.0
@@ -271,7 +304,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
             before = found.named[k]
-            own.gain, own.beyond, own.of_left = before.gain, before.beyond, before.of_left
+            own.gain, own.beyond = before.gain, before.beyond
+            own.of_left, own.of_lines = before.of_left, before.of_lines
             found.named[k] = own
         k += 1
     return current

@@ -13,7 +13,7 @@ import numpy as np
 
 from hdsim.diagnose.locate import Place
 from hdsim.diagnose.orders import Line
-from hdsim.diagnose.screen import Residual, Share, chance_of
+from hdsim.diagnose.screen import LEVEL, Residual, Share, chance_of
 from hdsim.diagnose.starts import neighbours, starts
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
@@ -96,7 +96,7 @@ def screen(
     measured = bench.measured
     for name, kind in catalogue().items():
         fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
-        if name in present and name != "sensors":
+        if name in present and not kind.several:
             found.skipped[name] = "the model has it"
             continue
         if not fittings:
@@ -166,9 +166,22 @@ def screen(
         if name not in best:
             found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
     found.ranked += best.values()
-    if found.ranked:
-        found.chance = chance_of(found.ranked[0].share, shares)
+    _remarkable_first(found, shares)
     return found
+
+
+def _remarkable_first(found: Screening, shares: Sequence[Share]) -> None:
+    """Set the chance of the best; where that may be chance, leave out what ranks above one that is not.
+
+    Each is held against the best of the whole search on surrogates, so asking all of them raises no alarm
+    more often than asking the first (single-step, Westfall and Young 1993).
+    """
+    chances = [chance_of(one.share, shares) for one in found.ranked[:1]]
+    if chances and chances[0] > LEVEL:
+        chances += [chance_of(one.share, shares) for one in found.ranked[1:] if one.share.share > 0]
+        first = next((k for k, chance in enumerate(chances) if chance <= LEVEL), 0)
+        found.ranked, chances = found.ranked[first:], chances[first:]
+    found.chance = chances[0] if chances else 1.0
 
 
 def _key(added: Added) -> tuple[str, str, tuple[float, ...]]:
@@ -205,8 +218,7 @@ def ranked_anew(screening: Screening, residual: Residual) -> Screening:
         kinds[0].others = kinds[1:]
         found.ranked.append(kinds[0])
     found.ranked.sort(key=lambda one: -one.share.share)
-    if found.ranked:
-        found.chance = chance_of(found.ranked[0].share, shares)
+    _remarkable_first(found, shares)
     return found
 
 

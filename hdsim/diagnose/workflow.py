@@ -161,7 +161,7 @@ def _diagnosed(
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
     problems += doubts
-    intervals = [i for i in base_intervals(current, base.freedoms) if i.determined]
+    intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)
     moved = [i for i in intervals if i.moved]

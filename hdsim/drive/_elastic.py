@@ -6,7 +6,7 @@ from typing import Any
 
 from hdsim._abi import call_mesh
 from hdsim._compile import compiled
-from hdsim.drive import _mesh
+from hdsim.drive import _mesh_layout
 from hdsim.drive._layout import (
     COLUMNS,
     ENERGIES,
@@ -70,23 +70,23 @@ def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
     """Ring angle at which mesh and structure balance: safeguarded Newton on the convex potential."""
     angles = scratch[S_RELATIVE : S_RELATIVE + 3]
     error = scratch[S_ERROR : S_ERROR + 6]
-    result = scratch[S_MESH : S_MESH + _mesh.RESULT_SIZE]
+    result = scratch[S_MESH : S_MESH + _mesh_layout.RESULT_SIZE]
     parameters = reals[integers[MESH_AT] :]
     free = reals[KAPPA] * angles[2]
     loaded = reals[GAIN] * (angles[0] * reals[INVERSE_RATIO] - reals[OUTPUT_SHARE] * angles[2] + error[0])
     # Wider than from free to loaded: pitch errors push without a twist, the window's slope pulls.
-    margin = 1e-5 + parameters[_mesh.LARGEST_PITCH_ERROR] / parameters[_mesh.LEVER]
+    margin = 1e-5 + parameters[_mesh_layout.LARGEST_PITCH_ERROR] / parameters[_mesh_layout.LEVER]
     low = min(free, loaded) - margin
     high = max(free, loaded) + margin
     angles[1] = free + 0.7 * (loaded - free)
     for _ in range(100):
         call_mesh(integers[MESH_ADDRESS], angles, error, parameters, result)
-        slope = result[_mesh.GRADIENT + 1]
+        slope = result[_mesh_layout.GRADIENT + 1]
         if slope > 0.0:
             high = angles[1]
         else:
             low = angles[1]
-        step = -slope / result[_mesh.HESSIAN + 3]
+        step = -slope / result[_mesh_layout.HESSIAN + 3]
         following = angles[1] + step
         if not (low <= following <= high):
             following = 0.5 * (low + high)
@@ -94,19 +94,19 @@ def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
         if abs(step) <= 1e-14 * (1e-3 + abs(following - free)) or following == angles[1]:
             break
         angles[1] = following
-    stiffness = result[_mesh.HESSIAN + 3]
-    scratch[S_RING_1] = -result[_mesh.HESSIAN + 1] / stiffness
+    stiffness = result[_mesh_layout.HESSIAN + 3]
+    scratch[S_RING_1] = -result[_mesh_layout.HESSIAN + 1] / stiffness
     scratch[S_RING_1 + 1] = 0.0
-    scratch[S_RING_1 + 2] = -result[_mesh.HESSIAN + 4] / stiffness
+    scratch[S_RING_1 + 2] = -result[_mesh_layout.HESSIAN + 4] / stiffness
     # Schur complement: Hessian of the potential with the ring at its balance.
-    mf = result[_mesh.HESSIAN + 1]
-    fo = result[_mesh.HESSIAN + 4]
-    result[_mesh.HESSIAN] -= mf * mf / stiffness
-    result[_mesh.HESSIAN + 2] -= mf * fo / stiffness
-    result[_mesh.HESSIAN + 5] -= fo * fo / stiffness
-    result[_mesh.HESSIAN + 1] = 0.0
-    result[_mesh.HESSIAN + 4] = 0.0
-    result[_mesh.GRADIENT + 1] = 0.0
+    mf = result[_mesh_layout.HESSIAN + 1]
+    fo = result[_mesh_layout.HESSIAN + 4]
+    result[_mesh_layout.HESSIAN] -= mf * mf / stiffness
+    result[_mesh_layout.HESSIAN + 2] -= mf * fo / stiffness
+    result[_mesh_layout.HESSIAN + 5] -= fo * fo / stiffness
+    result[_mesh_layout.HESSIAN + 1] = 0.0
+    result[_mesh_layout.HESSIAN + 4] = 0.0
+    result[_mesh_layout.GRADIENT + 1] = 0.0
     scratch[S_RELATIVE + 4] = (
         scratch[S_RING_1] * scratch[S_RELATIVE + 3] + scratch[S_RING_1 + 2] * scratch[S_RELATIVE + 5]
     )
@@ -127,19 +127,19 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     seen = scratch[S_RELATIVE + 3 : S_RELATIVE + 6]
     velocities = scratch[S_VELOCITIES : S_VELOCITIES + 3]
     error = scratch[S_ERROR : S_ERROR + 6]
-    result = scratch[S_MESH : S_MESH + _mesh.RESULT_SIZE]
+    result = scratch[S_MESH : S_MESH + _mesh_layout.RESULT_SIZE]
     ring = integers[RING]
     if ring == RING_STATIC:
         balance_ring(integers, reals, scratch)
     else:
         call_mesh(integers[MESH_ADDRESS], angles, error, reals[integers[MESH_AT] :], result)
-    h_mm = result[_mesh.HESSIAN]
-    h_mf = result[_mesh.HESSIAN + 1]
-    h_mo = result[_mesh.HESSIAN + 2]
+    h_mm = result[_mesh_layout.HESSIAN]
+    h_mf = result[_mesh_layout.HESSIAN + 1]
+    h_mo = result[_mesh_layout.HESSIAN + 2]
     # A ring in balance is no coordinate: the rest of the Hessian is its Schur complement.
-    h_ff = 0.0 if ring == RING_STATIC else result[_mesh.HESSIAN + 3]
-    h_fo = result[_mesh.HESSIAN + 4]
-    h_oo = result[_mesh.HESSIAN + 5]
+    h_ff = 0.0 if ring == RING_STATIC else result[_mesh_layout.HESSIAN + 3]
+    h_fo = result[_mesh_layout.HESSIAN + 4]
+    h_oo = result[_mesh_layout.HESSIAN + 5]
     # The ports: first derivatives over the angles; second ones exist only through the error.
     torsion = scratch[S_TWIST_1 : S_TWIST_1 + 3]
     meshing = scratch[S_MESH_1 : S_MESH_1 + 3]
@@ -154,8 +154,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         meshing[2] = gain * (error[2] - reals[OUTPUT_SHARE])
         curved_torsion = 0.0
         curved_mesh = gain
-        twist = result[_mesh.TWIST]
-        mesh_twist = result[_mesh.MESH_TWIST]
+        twist = result[_mesh_layout.TWIST]
+        mesh_twist = result[_mesh_layout.MESH_TWIST]
     else:
         torsion[0] = inverse + error[1]
         torsion[1] = 0.0
@@ -171,7 +171,9 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     for a in range(3):
         twist_rate += torsion[a] * seen[a]
         mesh_rate += meshing[a] * seen[a]
-    fill_inputs(t, integers, scratch, -result[_mesh.GRADIENT + 2], twist, twist_rate, mesh_twist, mesh_rate)
+    fill_inputs(
+        t, integers, scratch, -result[_mesh_layout.GRADIENT + 2], twist, twist_rate, mesh_twist, mesh_rate
+    )
     run_elements(integers, reals, scratch)
 
     columns = integers[COLUMNS]
@@ -185,7 +187,7 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         reaction = 0.0
         for a in range(3):
             reaction -= outputs[TWIST_TORQUE] * torsion[a] + outputs[MESH_TORQUE] * meshing[a]
-            reaction += result[_mesh.GRADIENT + a]
+            reaction += result[_mesh_layout.GRADIENT + a]
         outputs[housing + 1] += reaction / reals[HOUSING_INERTIA]
     for a in range(3):
         if ring != RING_DYNAMIC and a == 1:
@@ -194,7 +196,7 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
             outputs[a]
             + outputs[TWIST_TORQUE] * torsion[a]
             + outputs[MESH_TORQUE] * meshing[a]
-            - result[_mesh.GRADIENT + a]
+            - result[_mesh_layout.GRADIENT + a]
         )
         inertia = reals[INERTIA + a]
         kinetic += 0.5 * inertia * velocities[a] * velocities[a]
@@ -212,7 +214,7 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
             else:
                 delivered -= constraint * velocities[a]
     scratch[S_KINETIC] = kinetic
-    scratch[S_POTENTIAL] = result[_mesh.ENERGY] + outputs[STORED]
+    scratch[S_POTENTIAL] = result[_mesh_layout.ENERGY] + outputs[STORED]
     own = integers[OWN_STATES]
     energies = integers[STATES] - integers[ENERGIES]
     for k in range(own):

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from hdsim._compile import compiled
-from hdsim.drive import _mesh
+from hdsim.drive import _mesh_layout
 from hdsim.drive._layout import (
     COLUMNS,
     ENERGIES,
@@ -111,9 +111,9 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
     accelerations[2] = c * alpha + bend * vm * vm
     scratch[S_KINETIC] = 0.5 * total * vm * vm
     scratch[S_POTENTIAL] = outputs[STORED]
-    for k in range(_mesh.RESULT_SIZE):
+    for k in range(_mesh_layout.RESULT_SIZE):
         scratch[S_MESH + k] = 0.0
-    scratch[S_MESH + _mesh.ENGAGED] = math.nan
+    scratch[S_MESH + _mesh_layout.ENGAGED] = math.nan
     constraint = 0.0
     index = integers[STATE_OF]
     if free:

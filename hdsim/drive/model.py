@@ -17,7 +17,7 @@ from hdsim.kernel import OWN, SIGNAL_VALUES, Kernel
 if TYPE_CHECKING:
     from hdsim.drive.toothed import Teeth
     from hdsim.parts import Part
-    from hdsim.simulation.system import System
+    from hdsim.system import System
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Model(Contributed):
             account: what the energy audit needs.
 
     Attributes:
-        system: the ODE, a ``hdsim.simulation.system.System``.
+        system: the ODE, a ``hdsim.system.System``.
         states: the parts' own states in their order in the state vector.
         teeth: gaps, pitch errors and contact table of the toothed meshes, else None.
         heat_accounts: names of the accounts of heat, in the order of the compiled code; none without audit.
@@ -112,7 +112,7 @@ class Model(Contributed):
 
     def _mesh_parameters(self) -> tuple[Kernel | None, Array]:
         """The mesh kernel and its numbers."""
-        from hdsim.drive import _mesh, spring, toothed
+        from hdsim.drive import _mesh, _mesh_layout, spring, toothed
 
         mesh = self.drive.mesh
         if isinstance(mesh, RigidMesh):
@@ -125,12 +125,12 @@ class Model(Contributed):
                 [torsion.torque_t1_nm, torsion.torque_t2_nm],
                 reach,
             )
-            parameters = np.zeros(_mesh.HEADER)
-            parameters[_mesh.INVERSE_RATIO] = 1 / self.ratio
-            parameters[_mesh.EXTRA_GAP] = self._given.half_gap_rad
-            parameters[_mesh.SPRING_STEP] = step
-            parameters[_mesh.SPRING_CELLS] = len(cells)
-            parameters[_mesh.SPRING_AT] = _mesh.HEADER
+            parameters = np.zeros(_mesh_layout.HEADER)
+            parameters[_mesh_layout.INVERSE_RATIO] = 1 / self.ratio
+            parameters[_mesh_layout.EXTRA_GAP] = self._given.half_gap_rad
+            parameters[_mesh_layout.SPRING_STEP] = step
+            parameters[_mesh_layout.SPRING_CELLS] = len(cells)
+            parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER
             return _mesh.lumped_mesh, np.concatenate([parameters, cells.ravel()])
         self.teeth = toothed.Teeth(
             self.drive,
@@ -162,7 +162,7 @@ class Model(Contributed):
     def _assemble(self) -> System:
         from hdsim.drive import _layout as a
         from hdsim.drive._assembly import drive_system
-        from hdsim.simulation.system import System
+        from hdsim.system import System
 
         given = self._given
         if "output" in self.motions and self.rigid:

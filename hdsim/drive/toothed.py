@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.contact.parameters import ContactParameters, TableLawParameters
-from hdsim.drive import _mesh, spring
+from hdsim.drive import _mesh_layout as place
+from hdsim.drive import _teeth, _teeth_table, spring
 from hdsim.drive.parameters import ClearanceEngagement, Drive, TabulatedMesh, ToothedMesh, WindowEngagement
 from hdsim.errors import PhysicsError
 
@@ -88,26 +89,26 @@ class Teeth:
         self.pitch_errors_m = self._pitch_errors(seed)
         self.table_error: float | None = None
 
-        header = np.zeros(_mesh.HEADER)
-        header[_mesh.TEETH] = self.count
-        header[_mesh.GAIN] = gain
-        header[_mesh.OUTPUT_SHARE] = 0.0 if fixed else 1.0
-        header[_mesh.KAPPA] = 1.0 if fixed else 0.0
-        header[_mesh.INVERSE_RATIO] = 1 / drive.ratio
-        header[_mesh.LEVER] = self.lever_m
-        header[_mesh.SMOOTHING] = mesh.gap_smoothing_m
-        header[_mesh.LARGEST_PITCH_ERROR] = float(np.max(np.abs(self.pitch_errors_m)))
+        header = np.zeros(place.HEADER)
+        header[place.TEETH] = self.count
+        header[place.GAIN] = gain
+        header[place.OUTPUT_SHARE] = 0.0 if fixed else 1.0
+        header[place.KAPPA] = 1.0 if fixed else 0.0
+        header[place.INVERSE_RATIO] = 1 / drive.ratio
+        header[place.LEVER] = self.lever_m
+        header[place.SMOOTHING] = mesh.gap_smoothing_m
+        header[place.LARGEST_PITCH_ERROR] = float(np.max(np.abs(self.pitch_errors_m)))
         self._blocks: list[Array] = [header]
-        self._length = _mesh.HEADER
+        self._length = place.HEADER
         self._header = header
         self._place_contact()
         self._place_gaps(seed)
         # Twice over, so that any run of neighbouring teeth is contiguous.
-        header[_mesh.PITCH_ERROR_AT] = self._place(np.tile(self.pitch_errors_m, 2))
+        header[place.PITCH_ERROR_AT] = self._place(np.tile(self.pitch_errors_m, 2))
         self._place_engagement()
         self._place_structure(wind_ups)
         # The wear comes last: the catalogue's stiffness belongs to the new drive.
-        header[_mesh.EXTRA_GAP] = extra_half_gap_rad * self.scale * self.lever_m
+        header[place.EXTRA_GAP] = extra_half_gap_rad * self.scale * self.lever_m
         if isinstance(mesh, TabulatedMesh):
             self._place_table(mesh)
         self.parameters = np.concatenate(self._blocks)
@@ -133,9 +134,9 @@ class Teeth:
     def _place_contact(self) -> None:
         table = _kept_table(self.law, 20 * self.rated_tooth_force_n)
         header = self._header
-        header[_mesh.CONTACT_STEP] = table.step_m
-        header[_mesh.CONTACT_CELLS] = table.count
-        header[_mesh.CONTACT_AT] = self._place(table.coefficients)
+        header[place.CONTACT_STEP] = table.step_m
+        header[place.CONTACT_CELLS] = table.count
+        header[place.CONTACT_AT] = self._place(table.coefficients)
 
     def _place_gaps(self, seed: int) -> None:
         """Each tooth's half-gap as cells over the angle from the major axis (one cell: a constant)."""
@@ -149,7 +150,7 @@ class Teeth:
             cells = np.zeros((self.count, 1, 4))
             cells[:, 0, 0] = self.half_gaps_m
             if isinstance(mesh.engagement, WindowEngagement) and mesh.gap_smoothing_m == 0.0:
-                header[_mesh.CONSTANT_GAPS_AT] = self._place(np.tile(self.half_gaps_m, 2))
+                header[place.CONSTANT_GAPS_AT] = self._place(np.tile(self.half_gaps_m, 2))
         else:
             from scipy.interpolate import PchipInterpolator
 
@@ -161,8 +162,8 @@ class Teeth:
             curve = PchipInterpolator(nodes, gaps, axis=1)
             cells = np.moveaxis(curve.c[::-1], (0, 1, 2), (2, 1, 0))
             self.half_gaps_m = gaps.mean(axis=1)
-        header[_mesh.GAP_CELLS] = cells.shape[1]
-        header[_mesh.GAP_AT] = self._place(np.ascontiguousarray(cells))
+        header[place.GAP_CELLS] = cells.shape[1]
+        header[place.GAP_AT] = self._place(np.ascontiguousarray(cells))
 
     def _place_engagement(self) -> None:
         header = self._header
@@ -175,20 +176,20 @@ class Teeth:
                     f"edge_teeth = {engagement.edge_teeth:g} does not fit an arc of "
                     f"{half * self.count / np.pi:.1f} teeth within half a turn"
                 )
-            header[_mesh.PLATEAU], header[_mesh.BORDER] = half - edge, half + edge
+            header[place.PLATEAU], header[place.BORDER] = half - edge, half + edge
             return
-        header[_mesh.KIND] = 1.0
+        header[place.KIND] = 1.0
         if engagement.clearance_m is not None:
-            header[_mesh.CLEARANCE] = engagement.clearance_m
+            header[place.CLEARANCE] = engagement.clearance_m
         else:
-            header[_mesh.CLEARANCE] = self._calibrated_clearance(engagement)
+            header[place.CLEARANCE] = self._calibrated_clearance(engagement)
 
     def _calibrated_clearance(self, engagement: ClearanceEngagement) -> float:
         """Clearance at which the wanted share of teeth touches at rated torque, by bisection."""
         from scipy.optimize import brentq
 
         def excess(logarithm: float) -> float:
-            self._header[_mesh.CLEARANCE] = np.exp(logarithm)
+            self._header[place.CLEARANCE] = np.exp(logarithm)
             _, share = self.loaded(self.drive.rated_torque_nm / self.scale)
             return share - engagement.share
 
@@ -206,23 +207,23 @@ class Teeth:
         Args:
             numbers: the compiled mesh's numbers, changed in place. The potential of a tabulated mesh is not.
         """
-        first, length = int(numbers[_mesh.GAP_AT]), self.count * int(numbers[_mesh.GAP_CELLS]) * 4
+        first, length = int(numbers[place.GAP_AT]), self.count * int(numbers[place.GAP_CELLS]) * 4
         numbers[first : first + length] = 0.0
-        if constant := int(numbers[_mesh.CONSTANT_GAPS_AT]):
+        if constant := int(numbers[place.CONSTANT_GAPS_AT]):
             numbers[constant : constant + 2 * self.count] = 0.0
 
     def remove_pitch_errors(self, numbers: Array) -> None:
         """Take the pitch errors out of a built mesh; see ``close_gaps``."""
-        first = int(numbers[_mesh.PITCH_ERROR_AT])
+        first = int(numbers[place.PITCH_ERROR_AT])
         numbers[first : first + 2 * self.count] = 0.0
-        numbers[_mesh.LARGEST_PITCH_ERROR] = 0.0
+        numbers[place.LARGEST_PITCH_ERROR] = 0.0
 
     def torque(self, twist: float) -> tuple[float, float]:
         """Mean over the wave generator's angle of mesh torque (N m) and engaged share at a twist (rad)."""
         parameters = np.concatenate(self._blocks)
         angles = np.arange(PROBES) * np.pi / PROBES * (1 + 1 / self.count)
         samples = np.array(
-            [_mesh.teeth_potential(parameters, self.lever_m * twist, angle) for angle in angles]
+            [_teeth.teeth_potential(parameters, self.lever_m * twist, angle) for angle in angles]
         )
         return float(samples[:, 1].mean() * self.lever_m), float(samples[:, 6].mean() / self.count)
 
@@ -249,7 +250,7 @@ class Teeth:
         Pitch errors also shift its zero; with them it is half of that between plus and minus the torque.
         """
         twist = self.loaded(torque_nm / self.scale)[0]
-        if self._header[_mesh.LARGEST_PITCH_ERROR] > 0.0:
+        if self._header[place.LARGEST_PITCH_ERROR] > 0.0:
             twist = 0.5 * (twist - self.loaded(-torque_nm / self.scale)[0])
         return twist / self.scale
 
@@ -265,9 +266,9 @@ class Teeth:
             scale=self.scale,
         )
         header = self._header
-        header[_mesh.SPRING_STEP] = step
-        header[_mesh.SPRING_CELLS] = len(cells)
-        header[_mesh.SPRING_AT] = self._place(cells)
+        header[place.SPRING_STEP] = step
+        header[place.SPRING_CELLS] = len(cells)
+        header[place.SPRING_AT] = self._place(cells)
 
     def _place_table(self, mesh: TabulatedMesh) -> None:
         """Bicubic spline of the teeth's potential over displacement and angle, and its measured error."""
@@ -279,9 +280,9 @@ class Teeth:
         x = np.linspace(-reach, reach, mesh.twist_nodes)
         step = x[1] - x[0]
         angles = np.arange(mesh.angle_nodes) * np.pi / mesh.angle_nodes
-        values = np.array([[_mesh.teeth_potential(exact, xi, angle)[0] for angle in angles] for xi in x])
+        values = np.array([[_teeth.teeth_potential(exact, xi, angle)[0] for angle in angles] for xi in x])
         ends = np.array(
-            [[_mesh.teeth_potential(exact, xi, angle)[1] for angle in angles] for xi in (x[0], x[-1])]
+            [[_teeth.teeth_potential(exact, xi, angle)[1] for angle in angles] for xi in (x[0], x[-1])]
         )
         # Uniform B-spline coefficients: periodic in the angle, the exact force at both ends of x.
         turns = 2 * np.pi * np.arange(mesh.angle_nodes // 2 + 1) / mesh.angle_nodes
@@ -296,16 +297,16 @@ class Teeth:
             x, over_angle(values), k=3, t=knots, bc_type=([(1, forces[0])], [(1, forces[1])])
         )
         coefficients = np.ascontiguousarray(curve.c)
-        header[_mesh.TABLE_TWIST_STEP] = step
-        header[_mesh.TABLE_TWIST_START] = x[0]
-        header[_mesh.TABLE_TWIST_NODES] = len(coefficients)
-        header[_mesh.TABLE_ANGLE_NODES] = mesh.angle_nodes
-        header[_mesh.TABLE_AT] = self._place(coefficients)
+        header[place.TABLE_TWIST_STEP] = step
+        header[place.TABLE_TWIST_START] = x[0]
+        header[place.TABLE_TWIST_NODES] = len(coefficients)
+        header[place.TABLE_ANGLE_NODES] = mesh.angle_nodes
+        header[place.TABLE_AT] = self._place(coefficients)
         table = np.concatenate(self._blocks)
         rng = np.random.default_rng(0)
         points = np.stack([rng.uniform(-reach, reach, 2000), rng.uniform(0, np.pi, 2000)], axis=1)
         errors = [
-            abs(_mesh.table_potential(table, xi, a)[1] - _mesh.teeth_potential(exact, xi, a)[1])
+            abs(_teeth_table.table_potential(table, xi, a)[1] - _teeth.teeth_potential(exact, xi, a)[1])
             for xi, a in points
         ]
         self.table_error = float(max(errors)) * self.lever_m * self.scale / self.drive.rated_torque_nm

@@ -166,6 +166,8 @@ class Fitting:
         follows: measured channels that it takes as they are (``Builder.external``): asked only of records
             that have them.
         unless: measured channels that tell more than this way can: not asked of records that have them.
+        lives_in: coordinates in which this way's residual is a function, the most telling first; those of the
+            effect's signature where there are none.
     """
 
     terms: tuple[Term, ...]
@@ -178,6 +180,7 @@ class Fitting:
     cumulative: bool = False
     follows: tuple[str, ...] = ()
     unless: tuple[str, ...] = ()
+    lives_in: tuple[str, ...] = ()
 
     @property
     def in_series(self) -> bool:

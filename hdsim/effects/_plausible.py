@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from pydantic import BaseModel
+
+from hdsim.number import limits
 
 #: What a range is measured in, beside the field's own unit: numbers of the drive, SI units at the output or,
 #: with "motor", at the motor. ``cubic_stiffness``: the coefficient that doubles K1's torque at rated torque.
@@ -91,13 +92,8 @@ def range_of(effect: type[BaseModel], path: str) -> Range:
     *sections, last = [key for key in path.split(".") if not key.isdigit()]
     for section in sections:
         kind = _model_in(kind.model_fields[section].annotation)
-    least, most, plausible = -math.inf, math.inf, None
-    for note in kind.model_fields[last].metadata:
-        if isinstance(note, Plausible):
-            plausible = note
-        least = float(getattr(note, "ge", getattr(note, "gt", least)))
-        most = float(getattr(note, "le", getattr(note, "lt", most)))
-    return Range(least, most, plausible)
+    notes = kind.model_fields[last].metadata
+    return Range(*limits(notes), next((note for note in notes if isinstance(note, Plausible)), None))
 
 
 def _model_in(annotation: Any) -> type[BaseModel]:

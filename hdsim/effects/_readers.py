@@ -82,15 +82,31 @@ def quantised(values: Array, step: float) -> Array:
 
 
 @dataclass(frozen=True)
+class Ripple:
+    """(amplitude + relative * x) sin(order * angle + phase), amplitude in the channel's unit."""
+
+    channel: str
+    order: float
+    amplitude: float
+    relative: float
+    phase: float
+
+
+@dataclass(frozen=True)
 class EncoderReader:
-    """count(theta(t - t_d) + a sin(theta - phi) + noise): eccentricity a, quantisation and delay."""
+    """count(theta(t - t_d) + a sin(theta - phi) + ripples + noise): eccentricity a, steps and delay."""
 
     step: float
     eccentricity: float
     phase: float
     delay: float
     noise: Noise
-    needs: tuple[str, ...] = ()
+    ripples: tuple[Ripple, ...] = ()
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Channels of the angles that the ripples count."""
+        return tuple(sorted({r.channel for r in self.ripples}))
 
     @property
     def history(self) -> float:
@@ -101,6 +117,9 @@ class EncoderReader:
         """Reading of the angle; see ``Sensor``."""
         angle = np.interp(at - self.delay, times, values)
         angle = angle + self.eccentricity * np.sin(angle - self.phase)
+        for r in self.ripples:
+            counted = np.interp(at - self.delay, times, _channel(context, r.channel))
+            angle = angle + r.amplitude * np.sin(r.order * counted + r.phase)
         return quantised(angle + self.noise.at(at), self.step)
 
 
@@ -114,8 +133,8 @@ class DifferencedReader:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The angle's channel."""
-        return (self.channel,)
+        """The angle's channel, and those that the encoder needs."""
+        return (self.channel, *(name for name in self.encoder.needs if name != self.channel))
 
     @property
     def history(self) -> float:
@@ -128,17 +147,6 @@ class DifferencedReader:
         now = self.encoder.read(times, angle, at, context)
         before = self.encoder.read(times, angle, at - self.window, context)
         return np.asarray((now - before) / self.window)
-
-
-@dataclass(frozen=True)
-class Ripple:
-    """(amplitude + relative * x) sin(order * angle + phase), amplitude in the channel's unit."""
-
-    channel: str
-    order: float
-    amplitude: float
-    relative: float
-    phase: float
 
 
 @dataclass(frozen=True)

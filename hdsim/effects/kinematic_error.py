@@ -89,6 +89,7 @@ class KinematicError(Effect):
             "damaged_tooth": "a short bump: many harmonics of one pass, in a narrow range of angle",
         },
     )
+    several: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (
@@ -113,6 +114,17 @@ class KinematicError(Effect):
                     {"order": 4, "per": "wave_generator_turn"},
                 ]
             },
+            lives_in=("wave_generator_angle",),
+        ),
+        Fitting(
+            tuple(
+                Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.1)
+                for k in range(3)
+            ),
+            label="of the output",
+            turns=50.0,
+            settings={"components": [{"order": n, "per": "output_turn"} for n in (1, 2, 3)]},
+            lives_in=("output_angle",),
         ),
     )
 

@@ -15,6 +15,25 @@ if TYPE_CHECKING:
     from hdsim.effects._readers import EncoderReader, LinearReader, Sensor
 
 
+Turn = Literal["wave_generator_turn", "output_turn"]
+
+
+class EncoderRipple(Parameters):
+    """One harmonic of an encoder's error."""
+
+    order: float = Field(gt=0)
+    """Periods per turn of ``per``."""
+    per: Turn = "wave_generator_turn"
+    """The shaft whose turns ``order`` counts: its own (an oval scale), or that of a wave generator beside it,
+    whose lobes move the seat of the scale."""
+    amplitude_arcsec: Annotated[
+        float, Plausible(0.1, 120.0, "estimate: graduation and mounting errors of seconds to minutes of arc")
+    ] = Field(0.0, ge=0, le=3600)
+    """Amplitude, arcsec of the encoder's shaft."""
+    phase_deg: float = 0.0
+    """Phase at zero angle, degrees."""
+
+
 class Encoder(Parameters):
     """An angular encoder with one reading head."""
 
@@ -34,6 +53,8 @@ class Encoder(Parameters):
     """Age of a reading, s."""
     noise_arcsec: float = Field(0.0, ge=0)
     """Standard deviation of the noise before quantisation, arcsec."""
+    ripple: tuple[EncoderRipple, ...] = ()
+    """Further errors that are periodic in a shaft's angle."""
 
 
 class VelocitySensor(Parameters):
@@ -62,7 +83,7 @@ class SensorRipple(Parameters):
 
     order: float = Field(gt=0)
     """Periods per turn of ``per``."""
-    per: Literal["wave_generator_turn", "output_turn"] = "wave_generator_turn"
+    per: Turn = "wave_generator_turn"
     """The shaft whose turns ``order`` counts."""
     amplitude_nm: Annotated[
         float, Plausible(2e-4, 0.05, "estimate: up to some percent of a sensor's range", of="rated_torque")
@@ -94,8 +115,9 @@ class TorqueSensor(Parameters):
 class Sensors(Effect):
     """Sensors between the true channels and whoever reads them; a channel that is not named is read exactly.
 
-    Encoder: count(theta(t - t_d) + a sin(theta - phi) + noise). Speed: its difference over a window. Torque:
-    (1 + g) tau + sum (A + r tau) sin(order * angle + phase) + offset + noise, rounded and delayed.
+    Encoder: count(theta(t - t_d) + a sin(theta - phi) + sum A sin(order * angle + phase) + noise). Speed: its
+    difference over a window. Torque: (1 + g) tau + sum (A + r tau) sin(order * angle + phase) + offset +
+    noise, rounded and delayed.
     """
 
     title: ClassVar[str] = "sensor errors"
@@ -125,20 +147,46 @@ class Sensors(Effect):
             "amplitude",
         },
     )
+    several: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Harmonic("output_angle.eccentricity_arcmin", "output_angle.eccentricity_phase_deg", 0.2),),
             label="output encoder eccentricity",
+            lives_in=("output_angle",),
             needs=("output_angle",),
+        ),
+        Fitting(
+            (
+                Harmonic("output_angle.eccentricity_arcmin", "output_angle.eccentricity_phase_deg", 0.2),
+                *(
+                    Harmonic(
+                        f"output_angle.ripple.{k}.amplitude_arcsec", f"output_angle.ripple.{k}.phase_deg", 6.0
+                    )
+                    for k in range(2)
+                ),
+            ),
+            label="uneven scale of the output encoder",
+            needs=("output_angle",),
+            turns=50.0,
+            settings={"output_angle": {"ripple": [{"order": n, "per": "output_turn"} for n in (2, 3)]}},
+            lives_in=("output_angle",),
+        ),
+        Fitting(
+            (Periodic("output_angle.ripple", "amplitude_arcsec", 2.0, "output_angle"),),
+            label="ripple of the output encoder",
+            needs=("output_angle",),
+            lives_in=("wave_generator_angle",),
         ),
         Fitting(
             (Amplitude({"output_angle.delay_s": 5e-4}),),
             label="output encoder delay",
+            lives_in=("velocity",),
             needs=("output_angle",),
         ),
         Fitting(
             (Periodic("output_torque.ripple", "amplitude_nm", 0.1, "output_torque"),),
             label="torque-sensor ripple",
+            lives_in=("wave_generator_angle",),
             needs=("output_torque",),
         ),
     )
@@ -178,8 +226,13 @@ class Sensors(Effect):
         return found
 
 
+def _counted(per: Turn) -> str:
+    """Channel of the angle whose turns a ripple counts."""
+    return "motor_angle" if per == "wave_generator_turn" else "output_angle"
+
+
 def _encoder(given: Encoder, channel: str, seed: int) -> EncoderReader:
-    from hdsim.effects._readers import EncoderReader, Noise, step_of
+    from hdsim.effects._readers import EncoderReader, Noise, Ripple, step_of
 
     return EncoderReader(
         step=step_of(given.counts_per_turn),
@@ -187,6 +240,12 @@ def _encoder(given: Encoder, channel: str, seed: int) -> EncoderReader:
         phase=math.radians(given.eccentricity_phase_deg),
         delay=given.delay_s,
         noise=Noise(given.noise_arcsec * ARCMIN / 60.0, seed, channel),
+        ripples=tuple(
+            Ripple(
+                _counted(r.per), r.order, r.amplitude_arcsec * ARCMIN / 60.0, 0.0, math.radians(r.phase_deg)
+            )
+            for r in given.ripple
+        ),
     )
 
 
@@ -205,7 +264,7 @@ def _torque(given: TorqueSensor, channel: str, seed: int) -> LinearReader:
 
     ripples = tuple(
         Ripple(
-            channel="motor_angle" if r.per == "wave_generator_turn" else "output_angle",
+            channel=_counted(r.per),
             order=r.order,
             amplitude=r.amplitude_nm,
             relative=r.relative_amplitude,

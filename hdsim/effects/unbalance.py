@@ -47,11 +47,14 @@ class Unbalance(Effect):
         },
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting((Harmonic("output_kg_m", "output_phase_deg", 0.1),), label="output"),
+        Fitting(
+            (Harmonic("output_kg_m", "output_phase_deg", 0.1),), label="output", lives_in=("output_angle",)
+        ),
         Fitting(
             (Harmonic("motor_kg_m", "motor_phase_deg", 1e-3),),
             settings={"output_kg_m": 0.0},
             label="motor",
+            lives_in=("wave_generator_angle",),
             turns=1.0,
         ),
     )

@@ -20,7 +20,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation, robust_covariance
 from hdsim.estimate.determine import determined
 from hdsim.estimate.minimise import EVALUATIONS, minimised
-from hdsim.estimate.numbers import Free, Interval
+from hdsim.estimate.numbers import REACH, Free, Interval, scaled
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State
 from hdsim.estimate.vector import Measured, Vector, sensitivities
@@ -65,6 +65,7 @@ def fit(
     held_effects: int = 0,
     evaluations: int = EVALUATIONS,
     prune: bool = True,
+    sure: int = 0,
     theta: Mapping[str, float] | None = None,
     after: Fit | None = None,
     known: tuple[Array, float] | None = None,
@@ -79,6 +80,7 @@ def fit(
         held_effects: that many of the first added effects stay as they are.
         evaluations: residuals that the optimiser may ask for.
         prune: leave numbers that the data do not determine where they are.
+        sure: that many of the last numbers of the base are fitted in any case.
         theta: where the logarithms of the base's factors start, by name; 0 by default.
         after: an earlier fit whose undetermined numbers stay so, and widen the intervals of this one's.
         known: sensitivities near the start to the first numbers, shape (rows, up to p), and what one
@@ -91,20 +93,37 @@ def fit(
     chosen = list(frees)
     undetermined, ties = (list(after.undetermined), dict(after.ties)) if after is not None else ([], {})
     beside = after.beside if after is not None else None
+    moves: Array | None = None
     power = known[1] if known is not None else math.nan
     if prune and chosen:
         whole = Measured(bench, Vector(state, tuple(chosen), held_effects), theta)
         columns = whole.sensitivities(whole.start)
-        split = determined(columns, whole.residual(whole.start), whole.priors, whole.blocks, len(chosen))
-        undetermined += [chosen[k] for k in split.dropped]
+        asked = len(chosen) - sure
+        split = determined(columns, whole.residual(whole.start), whole.priors, whole.blocks, asked)
+        dropped = [chosen[k] for k in split.dropped]
         ties |= {chosen[k].name: [chosen[j].name for j in tied] for k, tied in split.ties.items()}
-        others = list(range(len(chosen), columns.shape[1]))
-        known, power = (columns[:, split.kept + others], split.power), split.power
-        chosen = [chosen[k] for k in split.kept]
+        kept = [*split.kept, *range(asked, columns.shape[1])]
+        known, power = (columns[:, kept], split.power), split.power
+        chosen = [chosen[k] for k in kept if k < len(chosen)]
+        back = np.array([free.none for free in dropped])
+        if np.any(back):
+            # What the data do not say is what was given: the others make up for it.
+            change = columns[:, split.dropped] @ back
+            moves = _standing_in(known[0], whole.priors[kept], change)
+            names = [free.name for free in chosen]
+            theta = dict(theta or {}) | dict(zip(names, moves[: len(chosen)].tolist(), strict=True))
+            state = scaled(state, dropped, back.tolist())
+            dropped = [free.moved(free.none) for free in dropped]
+            power = math.nan
+        undetermined += dropped
     in_series = any(added.fitting.in_series for added in state.added[held_effects:])
     vector = Vector(state, tuple(chosen), held_effects, in_series)
     problem = Measured(bench, vector, theta)
     x0 = problem.start
+    if moves is not None:
+        lower, upper = problem.bounds
+        x0 = x0 + np.concatenate([np.zeros(len(chosen)), moves[len(chosen) :]])
+        x0 = np.clip(x0, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
     predictions = problem.predicted(x0)
     start = problem.residual(x0)
     if len(x0) == 0:
@@ -129,6 +148,18 @@ def fit(
         vector.state(found.x), chosen, vector.logarithms(found.x), covariance,
         problem.predicted(found.x), columns, undetermined, ties, beside,
     )  # fmt: skip
+
+
+def _standing_in(columns: Array, priors: Array, change: Array) -> Array:
+    """How numbers move to make up for a change of the predictions, shape (p,).
+
+    Args:
+        columns: sensitivities to the numbers, shape (rows, p).
+        priors: their prior spreads, shape (p,).
+        change: whitened, shape (rows,).
+    """
+    moves, *_ = np.linalg.lstsq(columns * priors, -change, rcond=1e-3)
+    return np.asarray(np.clip(moves * priors, -REACH, REACH) if len(priors) else moves)
 
 
 def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:

@@ -22,6 +22,7 @@ from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_mean
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, least_squares_spline, signal, smoothed
 from hdsim.estimate.unloaded import unloaded_angle
+from hdsim.estimate.zeros import Zero, between_zeros
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
@@ -152,7 +153,11 @@ class Predictor:
 
     def __init__(self, record: Record, plan: Plan, ratio: float, rtol: float = RTOL) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
-        values = record.filled(plan.motion)
+        turns, self._zero = 0, 0.0
+        if plan.motion == "motor_angle" and "output_angle" in record.readable and not plan.locked:
+            turns, self._zero = between_zeros(record, ratio)
+        #: The prescribed reading, shape (n,), counted from the motor's zero that is next to the output's.
+        values = self._reading = record.filled(plan.motion) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         breaks, coefficients = smoothed(
             record.time, values, motion=not plan.locked, step=self._step(plan.motion)
@@ -208,7 +213,7 @@ class Predictor:
         """
         from scipy.interpolate import PPoly
 
-        time, raw = self.record.time, self.record.filled(self.plan.motion)
+        time, raw = self.record.time, self._reading
         smooth = self.motor_angle / self._factor
         step = self._step(self.plan.motion)
         # A loop's hiccup is no noise of the sensor: the median does not see it.
@@ -265,7 +270,7 @@ class Predictor:
         beside = noises(read, good, step, values - motor / self.ratio, whole)
         if beside[0] >= plain[0]:
             return values, trusted, *plain
-        return values - (motor - self.motor_angle) / self.ratio, whole, *beside
+        return values - (self._reading - self.motor_angle) / self.ratio, whole, *beside
 
     def predict(self, candidate: Candidate) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
@@ -287,6 +292,8 @@ class Predictor:
             # The scenario's load begins with the record, after the lead-in.
             late = LEAD_IN_S - self.record.begins_s
             parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(late))))
+        if self._zero:
+            parts.append(Zero(self._zero))
         motions: dict[str, Any] = {"motor": self.motion}
         if self.plan.locked == "output":
             motions["output"] = SignalData(Hold().move())
@@ -308,6 +315,8 @@ class Predictor:
             )
         except PhysicsError as error:
             raise PredictionError(str(error)) from None
+        for side in {"ring", "output"} & set(model.place_of):
+            model.system.y0[model.place_of[side]] = self._zero
         self.runs += 1
         asked = dict.fromkeys(self.plan.channels)
         if self._slow is not None:

@@ -41,6 +41,11 @@ class Added:
     orders: tuple[float, ...] = ()
 
     @property
+    def lives_in(self) -> tuple[str, ...]:
+        """Coordinates in which what it leaves is a function, the most telling first."""
+        return self.fitting.lives_in or catalogue()[self.effect].signature.lives_in
+
+    @property
     def at_limit(self) -> bool:
         """Whether a number stands at the end of its range: what is fitted would rather be another effect.
 

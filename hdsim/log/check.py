@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,9 +11,8 @@ import numpy as np
 from mcap import records
 from mcap.opcode import Opcode
 
-from hdsim.log import joint_states, naming, scan, schemas
-from hdsim.log.reader import double_fields
-from hdsim.log.rows import HEAD, DoubleField, RowLayout
+from hdsim.log import naming, scan
+from hdsim.log.message_check import MessageCheck
 
 _MOST_PROBLEMS = 50
 
@@ -102,65 +100,13 @@ def verify_log(path: str | Path) -> VerifyReport:
     return check.report
 
 
-class _MessageCheck:
-    """Whether messages of a channel parse."""
-
-    def __init__(self, channel: records.Channel, schema: records.Schema | None) -> None:
-        self._json = channel.message_encoding == "json"
-        self._fields: list[DoubleField] | None = None
-        self._class: Any = None
-        self._joints = False
-        self.reason: str | None = None
-        if channel.message_encoding == "protobuf" and schema is not None:
-            self._class = schemas.message_class(schema.name, schema.data)
-            fields = double_fields(schema)
-            self._fields = None if fields is None else [f for _, f in fields]
-        elif (
-            channel.message_encoding == "cdr"
-            and schema is not None
-            and schema.name == joint_states.MESSAGE_TYPE
-        ):
-            self._joints = True
-        elif not self._json:
-            self.reason = f"topic {channel.topic}: encoding {channel.message_encoding!r} is not checked here"
-
-    def take(self, data: bytes, run: scan.Run) -> str | None:
-        """Check a run of messages; returns what is wrong."""
-        if self._fields is not None:
-            first = memoryview(data)[run.start + HEAD.size : run.start + run.size]
-            layout = RowLayout.of_message(self._fields, first)
-            whole = np.frombuffer(data, np.uint8, run.count * run.size, run.start)
-            # All tags and lengths are right, and all else is doubles: nothing is left that could not parse.
-            if layout is not None and layout.matches(whole.reshape(run.count, run.size)):
-                run = scan.Run(run.opcode, run.start, run.size, 1)
-        if self._class is None and not self._json and not self._joints:
-            return None
-        for index, body in enumerate(scan.message_bodies(data, run)):
-            try:
-                if self._joints:
-                    wrong = joint_states.problem_of(bytes(body))
-                    if wrong:
-                        return f"message {index} of a run does not parse: {wrong}"
-                elif self._json:
-                    json.loads(body, parse_constant=_refuse)
-                else:
-                    self._class.FromString(body)
-            except Exception as error:  # protobuf and json raise types of their own
-                return f"message {index} of a run does not parse: {error}"
-        return None
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is not JSON")
-
-
 class _Check:
     def __init__(self, report: VerifyReport, data: scan.Buffer) -> None:
         self.report = report
         self._data = data
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
-        self._checks: dict[int, _MessageCheck] = {}
+        self._checks: dict[int, MessageCheck] = {}
         self._chunk_indexes: list[records.ChunkIndex] = []
         self._expected: dict[int, list[tuple[int, int]]] = {}
         self._counts: Counter[int] = Counter()
@@ -227,7 +173,7 @@ class _Check:
         if any(c.topic == channel.topic and c.id != channel.id for c in self._channels.values()):
             self.problem(f"topic {channel.topic} has more than one channel")
         try:
-            check = _MessageCheck(channel, schema_or_none)
+            check = MessageCheck(channel, schema_or_none)
         except ValueError as error:
             self.problem(f"topic {channel.topic}: {error}")
             return

@@ -11,7 +11,8 @@ import zlib
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import IO, Any, Literal, Protocol
+from pathlib import Path
+from typing import IO, Any, BinaryIO, Literal, Protocol
 
 import numpy as np
 import zstandard
@@ -19,6 +20,8 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
+
+from hdsim.errors import InputError
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_SIZE = 1 << 20
@@ -45,6 +48,21 @@ def library() -> str:
         return f"hdsim {version('hdsim')}; mcap {version('mcap')}"
     except PackageNotFoundError:
         return "hdsim"
+
+
+def opened(path: Path, partial: Path) -> BinaryIO:
+    """The file ``partial`` of a log that will be at ``path``, to be written; folders are made.
+
+    Raises:
+        InputError: the file cannot be made.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; a log needs a file name, such as run.mcap")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return partial.open("wb")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror}") from None
 
 
 class MessageIndexes:

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,6 +49,7 @@ RESERVED_TABLES = frozenset(
     | {table + suffix for table in VIEWED_TABLES for suffix in (VIEW_SUFFIX, LOOP_SUFFIX)}
 )
 
+_MEDIA_TYPES = {".yaml": "application/yaml", ".yml": "application/yaml", ".json": "application/json"}
 _LATEST_S = 7e9
 _EARLIEST_S = -1.5e9
 
@@ -70,6 +72,11 @@ def to_ns(time: Array) -> NDArray[np.int64]:
             f"time {float(bad)!r} s cannot be logged; allowed: {_EARLIEST_S:g} s to {_LATEST_S:g} s"
         )
     return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
+
+
+def media_type_of(name: str) -> str:
+    """Media type of an attachment, by the ending of its file name."""
+    return _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
 
 
 def topic_of(table: str) -> str:

@@ -9,6 +9,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+DEFAULT_VIEW_RATE_HZ = 1000.0
+
+VIEW_SAMPLES = 20_000
+"""Samples of the state in the view of one run: what a viewer plots without a wait."""
+
+
+def view_rate(duration: float) -> float:
+    """Rate in Hz at which the view of a run of ``duration`` s holds 20,000 samples."""
+    return VIEW_SAMPLES / duration if duration > 0 else np.inf
+
 
 class MinMaxView:
     """Thins a stream of rows to at most ``rate`` a second, keeping every column's minima and maxima.

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdsim.log import naming
-from hdsim.log.writer import VIEW_SAMPLES, LogWriter, view_rate
+from hdsim.log.view import VIEW_SAMPLES, view_rate
+from hdsim.log.writer import LogWriter
 from hdsim.recording import Table
 
 if TYPE_CHECKING:

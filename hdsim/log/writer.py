@@ -12,10 +12,11 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.log import naming
-from hdsim.log.container import Container, Watch
+from hdsim.log.container import Container, Watch, opened
+from hdsim.log.events import event_message
 from hdsim.log.joint_states import MESSAGE_TYPE, JointStateStream, has_joints
 from hdsim.log.streams import MessageStream, TableStream
-from hdsim.log.view import MinMaxView
+from hdsim.log.view import DEFAULT_VIEW_RATE_HZ, MinMaxView
 from hdsim.log.viewing import LoopStream, ViewStream, display_columns, scaled
 from hdsim.recording import Event, Table
 
@@ -24,19 +25,8 @@ if TYPE_CHECKING:
 
     Array = naming.Array
 
-VIEW_SAMPLES = 20_000
-"""Samples of the state in the view of one run: what a viewer plots without a wait."""
-
-DEFAULT_VIEW_RATE_HZ = 1000.0
 
 _JOINT_TABLES = ("state", "measured")
-_LEVELS = {"info": 2, "warning": 3, "error": 4}
-_MEDIA_TYPES = {".yaml": "application/yaml", ".yml": "application/yaml", ".json": "application/json"}
-
-
-def view_rate(duration: float) -> float:
-    """Rate in Hz at which the view of a run of ``duration`` s holds 20,000 samples."""
-    return VIEW_SAMPLES / duration if duration > 0 else np.inf
 
 
 class LogWriter:
@@ -52,8 +42,8 @@ class LogWriter:
         path: where the log will be; folders are made, an existing log is replaced when this one is closed.
         metadata: names to text: scenario, versions, seed, solver, tolerances.
         attachments: file names to contents, such as the scenario's YAML text.
-        view_rate_hz: samples a second in the decimated twin of the state; `view_rate` gives one that suits
-            a run's length. Infinite keeps every sample.
+        view_rate_hz: samples a second in the decimated twin of the state; `hdsim.log.view.view_rate` has
+            one that suits a run's length. Infinite keeps every sample.
         compression: of the chunks.
         watch: sees every message as it is written, for who shows the run while it goes on.
         layouts: attach the viewer's layouts that fit the log when it is closed.
@@ -81,13 +71,7 @@ class LogWriter:
         for key, value in metadata.items():
             if not isinstance(value, str):
                 raise InputError(f"metadata {key!r} is {type(value).__name__}; allowed: text")
-        try:
-            if self.path.is_dir():
-                raise InputError(f"{self.path} is a folder; a log needs a file name, such as run.mcap")
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = open(self.partial, "wb")  # noqa: SIM115 - closed in _finish
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be written: {error.strerror}") from None
+        self._file = opened(self.path, self.partial)
         self._view_rate = view_rate_hz
         self._views: dict[str, ViewStream] = {}
         self._topics: dict[str, list[str]] = {}
@@ -106,8 +90,7 @@ class LogWriter:
         self._container.metadata(naming.RUN_RECORD, metadata)
         for name, content in (attachments or {}).items():
             data = content.encode() if isinstance(content, str) else content
-            media_type = _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
-            self._container.attachment(name, media_type, data, naming.EPOCH_NS)
+            self._container.attachment(name, naming.media_type_of(name), data, naming.EPOCH_NS)
         self._container.flush()
 
     def __enter__(self) -> LogWriter:
@@ -206,23 +189,10 @@ class LogWriter:
         Raises:
             InputError: an unknown level.
         """
-        from foxglove_schemas_protobuf.Log_pb2 import Log
-        from google.protobuf.timestamp_pb2 import Timestamp
+        from hdsim.log.schemas import event_schema
 
-        from hdsim.log.schemas import EVENT_TIME_FIELD, event_schema
-        from hdsim.log.streams import double_field
-
-        if event.level not in _LEVELS:
-            raise InputError(f"event level {event.level!r} is unknown; allowed: {', '.join(_LEVELS)}")
         at = int(naming.to_ns(np.array([event.time]))[0])
-        seconds, nanos = divmod(at, 1_000_000_000)
-        log = Log(
-            timestamp=Timestamp(seconds=seconds, nanos=nanos),
-            level=_LEVELS[event.level],  # type: ignore[arg-type]
-            message=event.message,
-            name=event.source,
-        )
-        payload = log.SerializeToString(deterministic=True) + double_field(EVENT_TIME_FIELD, event.time)
+        payload = event_message(event, at)
         # Log times never go back within a topic; the message itself keeps the exact time.
         self._last_event_ns = max(at, self._last_event_ns)
         self.write_messages(

@@ -27,8 +27,8 @@ def reproduce(
     reproduced: follows from the paper's equations. contradicted: does not, with the correction beside it.
     not determined by the paper: it leaves something open.
     """
+    from hdsim.reproduce.checks import compute, names
     from hdsim.reproduce.report import print_rows, to_json, write
-    from hdsim.reproduce.rows import compute, names
 
     if listed:
         click.echo("\n".join(names()))

@@ -66,8 +66,9 @@ def _cost(drive: Mapping[str, Any], effects: Mapping[str, Any] | None = None) ->
     from hdsim.contact.law import ValidityWarning
     from hdsim.contact.majumdar_bhushan import MajumdarBhushan
     from hdsim.simulation.simulate import simulate
+    from hdsim.study.known_metrics import measure
+    from hdsim.study.known_procedures import find_procedure
     from hdsim.study.metrics.teeth import contact_law
-    from hdsim.study.registry import find_procedure, measure
 
     names = ("backlash", "lost_motion", "hysteresis_loss", "contact_wind_up", "tooth_contact_stiffness")
     with warnings.catch_warnings():
@@ -106,7 +107,7 @@ def without_gap() -> Cost:
 def positioning() -> Budget:
     """Positioning error under load, at the worst of four targets from both sides, split into its causes."""
     from hdsim.study.engine.budget import error_budget
-    from hdsim.study.registry import find_procedure
+    from hdsim.study.known_procedures import find_procedure
 
     scenario = find_procedure("positioning").build(
         _drive({}), effects=_EFFECTS, cycles=2, targets=4, load_torque_nm=LOAD_NM, run={"rtol": 1e-4}
@@ -118,7 +119,8 @@ def positioning() -> Budget:
 def kinematic_error() -> float:
     """Transmission error over one output turn without load, peak to peak, arcsec."""
     from hdsim.simulation.simulate import simulate
-    from hdsim.study.registry import find_procedure, measure
+    from hdsim.study.known_metrics import measure
+    from hdsim.study.known_procedures import find_procedure
 
     name = "transmission_accuracy"
     scenario = find_procedure("transmission_error").build(_drive({}), effects=_EFFECTS, run={"rtol": 1e-4})

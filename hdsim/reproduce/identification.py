@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from hdsim.reproduce import paper
 from hdsim.reproduce.rows import Row, Verdict, check
 from hdsim.surface.flank import Flank, structure_function, structure_function_constant
-from hdsim.surface.identify import identify, implied_heights, measured_structure_function, synthetic_profiles
+from hdsim.surface.identify import identify, implied_heights
+from hdsim.surface.sampled import measured_structure_function, synthetic_profiles
 
 Array = NDArray[np.float64]
 

@@ -3,8 +3,7 @@
 A six-stage, stiffly accurate, L-stable Rosenbrock method of order 4 with an embedded one of order 3 and a
 continuous extension of order 3: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed.,
 Springer 1996, section IV.7 (coefficients in ``_rodas.py``). Step-size control: the same book, section IV.8
-(Gustafsson's predictive controller). Initial step: Hairer, Norsett, Wanner, *Solving Ordinary Differential
-Equations I*, 2nd ed., section II.4.
+(Gustafsson's predictive controller).
 
 With u = sum gamma_ij k_j a step from (t, y) of size h solves, for i = 1..6,
 
@@ -25,6 +24,8 @@ import numpy as np
 from hdsim._abi import call_system
 from hdsim._compile import compiled
 from hdsim.simulation import _rodas as c
+from hdsim.simulation._first_step import first_not_finite, initial_step, suspect
+from hdsim.simulation._lu import factorise, solve
 
 _jit: Any = compiled
 
@@ -62,106 +63,6 @@ def work_size(size: int, quadratures: int) -> int:
 
 
 @_jit
-def _factorise(matrix, inverse, pivots, size):  # type: ignore[no-untyped-def]
-    """LU decomposition in place, partial pivoting; ``inverse`` gets the inverse pivots."""
-    for k in range(size):
-        best, row = abs(matrix[k, k]), k
-        for i in range(k + 1, size):
-            if abs(matrix[i, k]) > best:
-                best, row = abs(matrix[i, k]), i
-        pivots[k] = row
-        if row != k:
-            for j in range(size):
-                matrix[k, j], matrix[row, j] = matrix[row, j], matrix[k, j]
-        inverse[k] = 1.0 / matrix[k, k]
-        for i in range(k + 1, size):
-            factor = matrix[i, k] * inverse[k]
-            matrix[i, k] = factor
-            if factor != 0.0:
-                for j in range(k + 1, size):
-                    matrix[i, j] -= factor * matrix[k, j]
-
-
-@_jit
-def _solve(matrix, inverse, pivots, core, jacobian, size, step_gamma, b):  # type: ignore[no-untyped-def]
-    """Solve (1/(h gamma) - J) x = b in place: LU for the core, back-substitution for the quadratures."""
-    for k in range(core):
-        row = pivots[k]
-        value = b[row]
-        if row != k:
-            b[row] = b[k]
-            b[k] = value
-    # By columns: the updates of one column don't wait for each other.
-    for k in range(core - 1):
-        value = b[k]
-        for i in range(k + 1, core):
-            b[i] -= matrix[i, k] * value
-    for k in range(core - 1, -1, -1):
-        value = b[k] * inverse[k]
-        b[k] = value
-        for i in range(k):
-            b[i] -= matrix[i, k] * value
-    for i in range(core, size):
-        value = b[i]
-        for j in range(core):
-            value += jacobian[i, j] * b[j]
-        b[i] = value * step_gamma
-
-
-@_jit
-def _scaled_norm(values, y, rtol, atol):  # type: ignore[no-untyped-def]
-    """Root mean square of values / (atol + rtol |y|), SciPy's norm."""
-    total = 0.0
-    for i in range(len(y)):
-        ratio = values[i] / (atol[i] + rtol * abs(y[i]))
-        total += ratio * ratio
-    return sqrt(total / len(y))
-
-
-@_jit
-def _initial_step(address, t, y, integers, reals, scratch, f, span, rtol, atol, trial, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
-    """Size of the first step: one explicit Euler step tells the second derivative. ``span`` is signed."""
-    d0, d1 = _scaled_norm(y, y, rtol, atol), _scaled_norm(f, y, rtol, atol)
-    guess = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
-    guess = min(guess, abs(span))
-    h = guess if span > 0.0 else -guess
-    for i in range(len(y)):
-        trial[i] = y[i] + h * f[i]
-    call_system(address, t + h, trial, integers, reals, scratch, 0, dy, jacobian, dfdt)
-    for i in range(len(y)):
-        trial[i] = dy[i] - f[i]
-    d2 = _scaled_norm(trial, y, rtol, atol) / guess
-    largest = max(d1, d2)
-    chosen = max(1e-6, guess * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** 0.25
-    chosen = min(100.0 * guess, chosen)
-    return chosen if isfinite(chosen) else guess
-
-
-@_jit
-def _first_not_finite(values):  # type: ignore[no-untyped-def]
-    """Index of the first non-finite value, -1 if there is none."""
-    for i in range(len(values)):
-        if not isfinite(values[i]):
-            return i
-    return -1
-
-
-@_jit
-def _suspect(address, t, h, y, integers, reals, scratch, f, jacobian, dfdt, trial, dy):  # type: ignore[no-untyped-def]
-    """Index of the state whose equation gives the first bad number, at (t, y) or one Euler step on."""
-    bad = _first_not_finite(f)
-    for i in range(len(y)):
-        if bad < 0 and not (isfinite(dfdt[i]) and _first_not_finite(jacobian[i]) < 0):
-            bad = i
-    if bad < 0:
-        for i in range(len(y)):
-            trial[i] = y[i] + h * f[i]
-        call_system(address, t + h, trial, integers, reals, scratch, 0, dy, jacobian, dfdt)
-        bad = _first_not_finite(dy)
-    return bad
-
-
-@_jit
 def _next_stop(stops, t, t_bound):  # type: ignore[no-untyped-def]
     """Index of the first of the increasing ``stops`` beyond t on the way to ``t_bound``; may be none's."""
     if t_bound >= t:
@@ -177,7 +78,7 @@ def advance(  # type: ignore[no-untyped-def]
 
     Args:
         address: of the system kernel; ``integers``, ``reals`` and ``scratch`` are its own.
-        integers: see ``hdsim.simulation.system.System``.
+        integers: see ``hdsim.system.System``.
         reals: likewise.
         scratch: likewise.
         stops: increasing times at which a step has to end, shape (s,).
@@ -223,7 +124,7 @@ def advance(  # type: ignore[no-untyped-def]
         counts[NFEV] += 1
         counts[NJEV] += 1
         if control[STEP] == 0.0:
-            control[STEP] = _initial_step(
+            control[STEP] = initial_step(
                 address, t, y, integers, reals, scratch, f, t_bound - t, rtol, atol, new, dy, jacobian, u1
             )
             counts[NFEV] += 1
@@ -247,7 +148,7 @@ def advance(  # type: ignore[no-untyped-def]
                 for j in range(core):
                     matrix[i, j] = -jacobian[i, j]
                 matrix[i, i] += diagonal
-            _factorise(matrix, inverse, pivots, core)
+            factorise(matrix, inverse, pivots, core)
             counts[NLU] += 1
             step_gamma = h * c.GAMMA
             p = 1.0 / h
@@ -255,7 +156,7 @@ def advance(  # type: ignore[no-untyped-def]
             s1 = h * c.D1
             for i in range(n):
                 u1[i] = f[i] + s1 * dfdt[i]
-            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u1)
+            solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u1)
 
             for i in range(n):
                 new[i] = y[i] + c.A21 * u1[i]
@@ -263,7 +164,7 @@ def advance(  # type: ignore[no-untyped-def]
             s1, s2 = p * c.C21, h * c.D2
             for i in range(n):
                 u2[i] = dy[i] + s1 * u1[i] + s2 * dfdt[i]
-            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u2)
+            solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u2)
 
             for i in range(n):
                 new[i] = y[i] + c.A31 * u1[i] + c.A32 * u2[i]
@@ -271,7 +172,7 @@ def advance(  # type: ignore[no-untyped-def]
             s1, s2, s3 = p * c.C31, p * c.C32, h * c.D3
             for i in range(n):
                 u3[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * dfdt[i]
-            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u3)
+            solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u3)
 
             for i in range(n):
                 new[i] = y[i] + c.A41 * u1[i] + c.A42 * u2[i] + c.A43 * u3[i]
@@ -279,7 +180,7 @@ def advance(  # type: ignore[no-untyped-def]
             s1, s2, s3, s4 = p * c.C41, p * c.C42, p * c.C43, h * c.D4
             for i in range(n):
                 u4[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * dfdt[i]
-            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u4)
+            solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u4)
 
             for i in range(n):
                 new[i] = y[i] + c.A51 * u1[i] + c.A52 * u2[i] + c.A53 * u3[i] + c.A54 * u4[i]
@@ -287,7 +188,7 @@ def advance(  # type: ignore[no-untyped-def]
             s1, s2, s3, s4 = p * c.C51, p * c.C52, p * c.C53, p * c.C54
             for i in range(n):
                 u5[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * u4[i]
-            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u5)
+            solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u5)
 
             for i in range(n):
                 new[i] += u5[i]
@@ -295,7 +196,7 @@ def advance(  # type: ignore[no-untyped-def]
             s1, s2, s3, s4, s5 = p * c.C61, p * c.C62, p * c.C63, p * c.C64, p * c.C65
             for i in range(n):
                 u6[i] = dy[i] + s1 * u1[i] + s2 * u2[i] + s3 * u3[i] + s4 * u4[i] + s5 * u5[i]
-            _solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u6)
+            solve(matrix, inverse, pivots, core, jacobian, n, step_gamma, u6)
 
             total, bend = 0.0, 0.0
             for i in range(n):
@@ -316,12 +217,12 @@ def advance(  # type: ignore[no-untyped-def]
             if not isfinite(error):
                 counts[REJECTED] += 1
                 hopeless += 1
-                at_start = _first_not_finite(f) >= 0 or _first_not_finite(dfdt) >= 0
+                at_start = first_not_finite(f) >= 0 or first_not_finite(dfdt) >= 0
                 for i in range(n):
-                    at_start = at_start or _first_not_finite(jacobian[i]) >= 0
+                    at_start = at_start or first_not_finite(jacobian[i]) >= 0
                 size *= 0.1
                 if at_start or hopeless > _HOPELESS or size < smallest:
-                    counts[SUSPECT] = _suspect(
+                    counts[SUSPECT] = suspect(
                         address, t, h, y, integers, reals, scratch, f, jacobian, dfdt, new, dy
                     )
                     return NOT_FINITE

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.drive import _layout as a
-from hdsim.drive import _mesh
+from hdsim.drive import _mesh_layout, _teeth
 from hdsim.drive._assembly import observe
 from hdsim.errors import InputError
 from hdsim.kernel import (
@@ -224,7 +224,7 @@ class Observer:
             ),
         }
         if model.teeth is not None:
-            engaged = rows[:, a.S_MESH + _mesh.ENGAGED] / model.teeth.count
+            engaged = rows[:, a.S_MESH + _mesh_layout.ENGAGED] / model.teeth.count
             if not np.isnan(engaged).any():
                 columns["engaged_share"] = Column(engaged, "1", "share of the teeth that carry load")
         for k, state in enumerate(model.states, self._first_state):
@@ -266,8 +266,8 @@ class Observer:
         angles = np.zeros((len(times), teeth.count))
         for k in range(len(times)):
             motor, ring, _ = rows[k, a.S_ANGLES : a.S_ANGLES + 3]
-            twist = rows[k, a.S_MESH + _mesh.MESH_TWIST]
-            _mesh.tooth_forces(teeth.parameters, teeth.lever_m * twist, ring - motor, forces[k], angles[k])
+            twist = rows[k, a.S_MESH + _mesh_layout.MESH_TWIST]
+            _teeth.tooth_forces(teeth.parameters, teeth.lever_m * twist, ring - motor, forces[k], angles[k])
         return Table(
             times,
             {

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hdsim._evaluate import evaluate
 from hdsim.drive import _layout as a
-from hdsim.drive import _mesh
+from hdsim.drive import _mesh_layout
 from hdsim.drive.model import COORDINATES, Model
 from hdsim.errors import InputError
 from hdsim.kernel import MESH_TORQUE, OWN, TRANSMITTED_TORQUE, TWIST_TORQUE
-from hdsim.simulation._evaluate import evaluate
 from hdsim.simulation.ports import INPUTS, OUTPUT_UNITS, TorqueInputs
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ class Plant:
             bent = outputs[MESH_TORQUE] * self.system.reals[a.GAIN]
         else:
             bent = outputs[TWIST_TORQUE] + outputs[MESH_TORQUE]
-        hessian = s[a.S_MESH + _mesh.HESSIAN : a.S_MESH + _mesh.HESSIAN + 6]
+        hessian = s[a.S_MESH + _mesh_layout.HESSIAN : a.S_MESH + _mesh_layout.HESSIAN + 6]
         row[[0, 2, 4]] -= hessian[[2, 4, 5]]
         row[0] += bent * by_mo
         row[4] += bent * by_oo

@@ -15,7 +15,7 @@ from hdsim.simulation import _cover
 from hdsim.simulation import _rosenbrock as compiled
 from hdsim.simulation.failures import Guard
 from hdsim.simulation.solvers import Integration, Statistics
-from hdsim.simulation.system import System
+from hdsim.system import System
 
 Array = NDArray[np.float64]
 

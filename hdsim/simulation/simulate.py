@@ -92,8 +92,9 @@ def simulate_to_log(
         The run, with audit, statistics and, if it stopped early, its ``failure``.
     """
     from hdsim.log import LogWriter
-    from hdsim.log.scene import SceneGeometry, SceneWriter
-    from hdsim.log.writer import view_rate
+    from hdsim.log.scene import SceneWriter
+    from hdsim.log.scene_geometry import SceneGeometry
+    from hdsim.log.view import view_rate
 
     run = build_run(scenario)
     started = time.perf_counter()

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
-from hdsim.simulation.system import System
+from hdsim.system import System
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from hdsim.errors import InputError
 from hdsim.simulation.simulate import simulate
 from hdsim.study.bench import frequency, friction, torsion
 from hdsim.study.bench._scenario import bench
-from hdsim.study.registry import find_metric
+from hdsim.study.known_metrics import find_metric
 
 if TYPE_CHECKING:
     from hdsim.scenario import Scenario

@@ -38,7 +38,7 @@ def bench(
     catalogue's line, if there is one.
     """
     from hdsim.study.bench.report import figures_of, run_procedure
-    from hdsim.study.registry import find_procedure, procedures
+    from hdsim.study.known_procedures import find_procedure, procedures
 
     chosen = [find_procedure(name) for name in only] or list(procedures().values())
     if listing:

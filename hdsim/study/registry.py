@@ -1,8 +1,8 @@
 """What a study can measure: metrics and bench procedures, found by name.
 
 A metric is one number of one run; a procedure is the scenario of a bench test, the metrics that it is made
-for, and its picture. Both register themselves where they are defined; ``metrics()`` and ``procedures()``
-import those modules when they are first asked for.
+for, and its picture. Both register themselves where they are defined; ``known_metrics`` and
+``known_procedures`` import those modules and look them up.
 """
 
 from __future__ import annotations
@@ -89,72 +89,36 @@ class Procedure:
     variants: tuple[Mapping[str, Any], ...] = field(default=({},))
 
 
-_metrics: dict[str, Metric] = {}
-_procedures: dict[str, Procedure] = {}
+registered_metrics: dict[str, Metric] = {}
+registered_procedures: dict[str, Procedure] = {}
 
 
 def metric(name: str, unit: str, description: str, source: str) -> Callable[[Measure], Metric]:
     """Register a function ``(recording, scenario) -> float`` as a metric."""
 
     def register(measure: Measure) -> Metric:
-        if name in _metrics:
+        if name in registered_metrics:
             raise ValueError(f"there are two metrics {name!r}")
-        _metrics[name] = Metric(name, unit, description, source, measure)
-        return _metrics[name]
+        registered_metrics[name] = Metric(name, unit, description, source, measure)
+        return registered_metrics[name]
 
     return register
 
 
 def procedure(given: Procedure) -> Procedure:
     """Register a bench procedure."""
-    if given.name in _procedures:
+    if given.name in registered_procedures:
         raise ValueError(f"there are two procedures {given.name!r}")
-    _procedures[given.name] = given
+    registered_procedures[given.name] = given
     return given
 
 
-def metrics() -> dict[str, Metric]:
-    """Every metric by name."""
-    import hdsim.study.metrics  # noqa: F401 - importing registers
-
-    return dict(_metrics)
-
-
-def procedures() -> dict[str, Procedure]:
-    """Every bench procedure by name."""
-    import hdsim.study.bench  # noqa: F401 - importing registers
-
-    return dict(_procedures)
-
-
-def find_metric(name: str) -> Metric:
-    """The metric of that name.
+def named(kind: str, name: str, known: Mapping[str, T]) -> T:
+    """What is known by that name.
 
     Raises:
         InputError: there is none; the message names the nearest.
     """
-    return _found("metric", name, metrics())
-
-
-def find_procedure(name: str) -> Procedure:
-    """The procedure of that name.
-
-    Raises:
-        InputError: there is none; the message names the nearest.
-    """
-    return _found("procedure", name, procedures())
-
-
-def measure(names: Sequence[str], recording: Recording, scenario: Scenario) -> dict[str, float]:
-    """Several metrics of one run, by name.
-
-    Raises:
-        InputError: an unknown metric, or one that the run does not contain.
-    """
-    return {name: find_metric(name)(recording, scenario) for name in names}
-
-
-def _found(kind: str, name: str, known: Mapping[str, T]) -> T:
     if name in known:
         return known[name]
     from difflib import get_close_matches

@@ -6,14 +6,16 @@ All else in `hdsim.tell` reads these; only `gather` walks through a live diagnos
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hdsim.diagnose.coordinates import coordinates
-from hdsim.diagnose.evidence import Evidence, PlaceEvidence, StageEvidence
+from hdsim.diagnose.evidence import Evidence, LawEvidence, PlaceEvidence, StageEvidence
 from hdsim.diagnose.orders import Line, order_lines
 from hdsim.diagnose.rules import RULES
 from hdsim.diagnose.verdict import Remainder, Verdict
@@ -160,22 +162,50 @@ class Findings:
         return min([*chances, *(law.chance for law in self.evidence.laws)], default=1.0)
 
     @property
+    def not_believed(self) -> list[LawEvidence]:
+        """Effects that the search has added and that have no name beside the named ones."""
+        named = Counter(effect.name for effect in self.verdict.effects)
+        found = []
+        for law in self.evidence.laws if named else ():
+            if named[law.name]:
+                named[law.name] -= 1
+            else:
+                found.append(law)
+        return found
+
+    @property
     def unexplained(self) -> float:
-        """Part of all structure that the named effects leave; 0 where none is named."""
-        return 1.0 - self.evidence.explained if self.verdict.effects and self.evidence.laws else 0.0
+        """Part of all structure that the named effects leave; 0 where none is named.
+
+        The evidence counts all that the search has added: what only the others explain is left, too.
+        """
+        if not (self.verdict.effects and self.evidence.laws):
+            return 0.0
+        return min(1.0 - self.evidence.explained + sum(law.gain for law in self.not_believed), 1.0)
 
     @property
     def other_shape(self) -> tuple[float, PlaceEvidence] | None:
         """That part and where it lives, where it is no chance; None else."""
         places = self.evidence.stages[-1].places if self.evidence.stages else []
-        real = self.evidence.left_chance <= RULES.chance and self.unexplained >= LEAST_REST
-        return (self.unexplained, places[0]) if real and places else None
+        left = 1.0 - self.evidence.explained
+        real = self.evidence.left_chance <= RULES.chance and left >= LEAST_REST and self.unexplained > 0.0
+        return (left, places[0]) if real and places else None
 
     @property
-    def times_noise(self) -> float:
-        """What is left of the channel that is left with most, in units of its noise; 0 where unknown."""
+    def left_most(self) -> tuple[str, float]:
+        """The channel that is left with most, and how much in units of its noise; 0 where unknown.
+
+        Where the search has added more than is named it is the gap of the named effects alone.
+        """
         rest = self.evidence.rest
-        return rest.times_noise if rest is not None and math.isfinite(rest.times_noise) else 0.0
+        if self.not_believed and self.verdict.gap:
+            each = {
+                channel: gap.after / gap.noise for channel, gap in self.verdict.gap.items() if gap.noise > 0
+            }
+            return max(
+                ((c, v) for c, v in each.items() if math.isfinite(v)), key=itemgetter(1), default=("", 0.0)
+            )
+        return (rest.channel, rest.times_noise) if rest and math.isfinite(rest.times_noise) else ("", 0.0)
 
 
 def gather(diagnosis: Diagnosis) -> Findings:

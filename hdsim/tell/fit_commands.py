@@ -7,31 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hdsim.tell.commands import _DATA, _FILE
+from hdsim.tell.commands_shared import measured_options, opened
 
 if TYPE_CHECKING:
     from hdsim.estimate.outcome import FitResult
 
 
 @click.command()
-@click.argument("measured", nargs=-1, required=True, type=_DATA)
-@click.option("--model", required=True, type=_FILE, help="Scenario whose numbers are fitted.")
-@click.option("--mapping", type=_FILE, help="What the columns mean; a log of hdsim needs none.")
-@click.option("--holdout", multiple=True, type=_DATA, help="Records that only the proof sees.")
+@measured_options
 @click.option(
     "--free", multiple=True, metavar="PATH", help="A number that moves; without it all declared ones."
 )
 @click.option("--fix", multiple=True, metavar="PATH", help="A number that does not move.")
 @click.option("--apart", multiple=True, metavar="PATH", help="A number of a group that moves by itself.")
-@click.option(
-    "--out", required=True, type=click.Path(file_okay=False, path_type=Path), help="Where to write."
-)
-@click.option(
-    "--load",
-    type=click.Choice(["scenario", "load_torque", "output_torque"]),
-    help="Where the load's torque comes from [load_torque when measured, else scenario].",
-)
-@click.option("--force", is_flag=True, help="Go on in spite of errors in the data.")
 def fit(
     measured: tuple[Path, ...],
     model: Path,
@@ -52,22 +40,10 @@ def fit(
     """
     import hdsim
     from hdsim.estimate.outcome import result_of
-    from hdsim.estimate.records import record_from
     from hdsim.tell.fit_report import save_fit
-    from hdsim.tell.staging import staged
     from hdsim.tell.terminal import Progress
 
-    for path in holdout:
-        if path.resolve() in {p.resolve() for p in measured}:
-            raise hdsim.InputError(f"--holdout: {path} is also a measured record, which the fit sees")
-    scenario = hdsim.load_scenario(model)
-    # Better known now than after the fit.
-    with staged(out, keep=False):
-        pass
-    records, held = (
-        [record_from(hdsim.import_recording(path, mapping), path.name) for path in paths]
-        for paths in (measured, holdout)
-    )
+    scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
         found = hdsim.fit(
             records, scenario, holdout=held, free=free, fix=fix, apart=apart, load=load, force=force,

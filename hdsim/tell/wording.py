@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from hdsim.diagnose.name import LEVEL
 from hdsim.diagnose.rules import RULES
+from hdsim.diagnose.screen import LEVEL
 from hdsim.diagnose.verdict import NamedEffect, Verdict
 from hdsim.estimate.found import FittedNumber
 from hdsim.tell.because import weighings
@@ -44,7 +44,7 @@ MEANINGS = {
     "better no name than a wrong one.",
 }
 #: Words for the probability that a name is right, from the highest down.
-_SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sure"))
+SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sure"))
 #: Words for how many standard errors the number that moved farthest lies from the model's.
 _FAR = ((6.0, "Very sure"), (3.5, "Sure"), (0.0, "Fairly sure"))
 #: Nothing is called very sure while more than this is left: times the noise, part of the structure.
@@ -228,9 +228,9 @@ def _nothing_more(found: Findings) -> str:
 def much_left(found: Findings) -> str:
     """What is left, where it is too much to call anything very sure; empty else."""
     said = []
-    if found.times_noise > MUCH_NOISE and found.evidence.rest is not None:
-        channel = spoken(found.evidence.rest.channel)
-        said.append(f"{times(found.times_noise)} the noise of the {channel}")
+    channel, most = found.left_most
+    if most > MUCH_NOISE:
+        said.append(f"{times(most)} the noise of the {spoken(channel)}")
     if found.unexplained > MUCH_STRUCTURE:
         said.append(f"{percent(found.unexplained)} of the structure")
     return " and ".join(said) + (" is left" if len(said) == 1 else " are left") if said else ""
@@ -245,7 +245,7 @@ def _capped(sure: Sureness, found: Findings) -> Sureness:
 def _of_effects(found: Findings) -> Sureness:
     effects = found.verdict.effects
     least = min((effect.confidence for effect in effects), default=0.0)
-    words = _word(_SURE, least)
+    words = _word(SURE, least)
     grouped = any(effect.indistinguishable_from for effect in effects)
     if grouped:
         words += (
@@ -287,8 +287,9 @@ def _of_the_unknown(found: Findings) -> Sureness:
             f"The chance to see so much of a pattern in pure noise is {below(chance)}; "
             f"{percent(stage.structured)} of what the model leaves, weighed by the noise, is that pattern.",
         )
-    if chance > RULES.chance and found.times_noise > RULES.rest:
-        return Sureness(words, f"{times(found.times_noise)} the noise is left", tuple(said))
+    most = found.left_most[1]
+    if chance > RULES.chance and most > RULES.rest:
+        return Sureness(words, f"{times(most)} the noise is left", tuple(said))
     if chance > RULES.chance:
         words = "Not sure that anything is missing"
     return Sureness(words, f"{below(chance)} by chance", tuple(said))

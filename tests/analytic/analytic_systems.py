@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
 from hdsim.kernel import system as system_kernel
-from hdsim.simulation.system import System
+from hdsim.system import System
 
 NO_INTEGERS = np.zeros(1, dtype=np.int64)
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from contract import Measured
+from contract import Case, Kind, Measured
+
+#: Part of a wanted strength that a drawn case reaches, and the case.
+Try = tuple[float, Case]
 
 GRAVITY = 9.80665
 #: Rates of the log, Hz; the plants' clocks are multiples of all of them.
@@ -271,6 +275,40 @@ def started(d: Drive, sensing: Sensing) -> float:
     return float(min(1.0, 0.2 * sensing.noise["output_angle"] / left))
 
 
+def kind_of(number: int, seed: int, kinds: Sequence[Kind]) -> tuple[Kind, int]:
+    """Kind of a case and its turn: the kinds go round by the number, and the seed shifts what is hidden."""
+    return kinds[number % len(kinds)], number // len(kinds) + seed
+
+
+def draw_parameters(rng: np.random.Generator) -> tuple[str, ...]:
+    """One or two numbers of the base that are to be off."""
+    return tuple(str(n) for n in rng.choice(list(PARAMETERS), int(rng.integers(1, 3)), replace=False))
+
+
+def first_near(
+    family: str, number: int, seed: int, tries: int, drawn: Callable[[np.random.Generator], Try | None]
+) -> Case:
+    """The first try that reaches half of the strength it wants, else the one that reaches the most of it.
+
+    Args:
+        family: its name; family, number, seed and try make the random numbers.
+        number: of the case.
+        seed: of the case.
+        tries: how many.
+        drawn: part of the strength that is reached, and the case; ``None`` where there is no such drive.
+    """
+    best: Try | None = None
+    for attempt in range(tries):
+        found = drawn(np.random.default_rng([seed, number, attempt, zlib.crc32(family.encode())]))
+        if found is not None and found[0] > 0.5:
+            return found[1]
+        if found is not None and (best is None or found[0] > best[0]):
+            best = found
+    if best is None:
+        raise ArithmeticError(f"{family} {number}/{seed}: no drive of {tries} could be built")
+    return best[1]
+
+
 def draw_lengths(
     rng: np.random.Generator, rate: int, *, least: float = 5.0
 ) -> tuple[list[float], list[float], str]:
@@ -288,6 +326,16 @@ def draw_lengths(
     given = [one(min(60.0 if count == 1 else 20.0, most / count)) for _ in range(count)]
     held = [one(min(15.0, most / 3)) for _ in range(int(rng.integers(1, 3)))] if files else []
     return given, held, "files" if files else "stretches"
+
+
+def said(drive: Drive, sensing: Sensing, records: Sequence[Measured]) -> dict[str, object]:
+    """What a case says of its drive and its sensors."""
+    return {
+        "rate_hz": sensing.rate, "encoder_step_over_noise": sensing.coarseness, "sensors": sensing.kind,
+        "seconds": [float(r.time[-1]) for r in records], "records": len(records),
+        "temperature": sensing.temperature, "load": "arm" if drive.arm else "inertia", "size": drive.size,
+        "ratio": drive.ratio, "noise": {c: sensing.sigma(c) for c in sensing.channels},
+    }  # fmt: skip
 
 
 def visible(trace: np.ndarray, columns: Sequence[np.ndarray]) -> tuple[float, float]:

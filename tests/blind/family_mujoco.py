@@ -9,23 +9,26 @@ of it at most. What is only a number of the base counts as it is.
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from contract import Case, Kind, Measured
 from drawing import (
-    PARAMETERS,
     SENSORS,
     SKIP_S,
     Drive,
     Sensing,
+    Try,
     base_yaml,
     draw_drive,
     draw_lengths,
+    draw_parameters,
     draw_sensing,
+    first_near,
+    kind_of,
     log_uniform,
     off,
+    said,
     slower,
     started,
     visible,
@@ -253,21 +256,12 @@ def measured(
 
 def draw(number: int, seed: int) -> Case:
     """A case; everything follows from the two numbers."""
-    kind = KINDS[number % len(KINDS)]
-    turn = number // len(KINDS) + seed
-    best: Case | None = None
-    for attempt in range(TRIES):
-        rng = np.random.default_rng([seed, number, attempt, zlib.crc32(FAMILY.encode())])
-        case, near = _drawn(kind, turn, number, seed, rng)
-        if near > 0.5:
-            return case
-        if best is None or near > best[1]:
-            best = (case, near)
-    return best[0]
+    return first_near(FAMILY, number, seed, TRIES, lambda rng: _drawn(number, seed, rng))
 
 
-def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generator) -> tuple[Case, float]:
-    """A case, and the least part of a wanted strength that it reaches."""
+def _drawn(number: int, seed: int, rng: np.random.Generator) -> Try:
+    """The least part of a wanted strength that is reached, and the case."""
+    kind, turn = kind_of(number, seed, KINDS)
     hidden: tuple[Hidden, ...] = ()
     names: tuple[str, ...] = ()
     if kind == "effect":
@@ -279,7 +273,7 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
     elif kind == "outside":
         hidden = (OUTSIDE[turn % len(OUTSIDE)],)
     elif kind == "parameter":
-        names = tuple(str(n) for n in rng.choice(list(PARAMETERS), int(rng.integers(1, 3)), replace=False))
+        names = draw_parameters(rng)
     x = draw_experiment(rng, hidden, names)
     if x.drive.rigid:
         names = tuple(n for n in names if n != "stiffness")
@@ -306,20 +300,15 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
         strengths = [round(seen.of(changes)[0], 3)]
     records, held = measured(x, changes, rng)
     what = "+".join(h.name for h in hidden) or "+".join(names) or "nothing"
-    sensing = x.sensing
-    setup = {
-        "rate_hz": sensing.rate, "encoder_step_over_noise": sensing.coarseness,
-        "sensors": sensing.kind, "seconds": [float(r.time[-1]) for r in records], "records": len(records),
-        "held": "files" if held else "stretches", "motion": x.kinds, "temperature": sensing.temperature,
+    setup = said(x.drive, x.sensing, records) | {
+        "held": "files" if held else "stretches", "motion": x.kinds,
         "formula": "other" if hidden and (kind == "outside" or not same) else "catalogue",
-        "mesh": "rigid" if x.drive.rigid else "lumped", "load": "arm" if x.drive.arm else "inertia",
-        "size": x.drive.size, "ratio": x.drive.ratio, "changes": changes, "asked": tuple(asked),
-        "noise": {c: sensing.sigma(c) for c in sensing.channels},
+        "mesh": "rigid" if x.drive.rigid else "lumped", "changes": changes, "asked": tuple(asked),
     }  # fmt: skip
     lacks = [name for h in hidden for name in h.lacks]
-    return Case(
+    return near, Case(
         f"{FAMILY}/{kind}/{what}/{number}/{seed}", FAMILY, kind,
         tuple(frozenset(h.accepted or (h.name,)) for h in hidden if kind != "outside"),
         tuple(records), tuple(held), base_yaml(x.drive, mesh=setup["mesh"], lacks=lacks), None,
         tuple(strengths), truth, setup,
-    ), near  # fmt: skip
+    )  # fmt: skip

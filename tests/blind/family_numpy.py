@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from contract import Case, Kind
+from drawing import log_uniform
 from drives import DRIVES, GRAVITY, LEVER, around, base_yaml
 from hidden import ANY, EFFECTS, KINDS_OF, Changes, Expected, Hidden
 from outside import OUTSIDE
@@ -110,10 +111,6 @@ def draw(number: int, seed: int) -> Case:
     return _case(wanted, best, number, seed)
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
 def wanted_of(number: int, seed: int, rng: np.random.Generator) -> Wanted:
     """Kind by the number; effects in turn in an order that the seed shuffles."""
     kind = KINDS[number % len(KINDS)]
@@ -123,14 +120,14 @@ def wanted_of(number: int, seed: int, rng: np.random.Generator) -> Wanted:
     strengths: tuple[float, ...] = ()
     if kind == "effect":
         hidden = (EFFECTS[order.permutation(len(EFFECTS))[turn % len(EFFECTS)]],)
-        strengths = (_log_uniform(rng, *STRENGTH),)
+        strengths = (log_uniform(rng, *STRENGTH),)
     elif kind == "outside":
         hidden = (OUTSIDE[order.permutation(len(OUTSIDE))[turn % len(OUTSIDE)]],)
-        strengths = (_log_uniform(rng, *OUTSIDE_STRENGTH),)
+        strengths = (log_uniform(rng, *OUTSIDE_STRENGTH),)
     elif kind == "pair":
         hidden = _pair(rng)
-        first = _log_uniform(rng, *PAIR_STRENGTH)
-        strengths = (first, float(np.clip(first * _log_uniform(rng, 0.2, 5.0), *PAIR_STRENGTH)))
+        first = log_uniform(rng, *PAIR_STRENGTH)
+        strengths = (first, float(np.clip(first * log_uniform(rng, 0.2, 5.0), *PAIR_STRENGTH)))
     count, most = 0, 0.2
     if kind == "parameter":
         count, most = (1 if rng.random() < 0.6 else 2), 0.3
@@ -192,17 +189,17 @@ def _setups(
     arm = any(h.arm for h in hidden) or bool({"mass", "load-dependent loss"} & set(wanted.off))
     drive = around(DRIVES[rng.integers(len(DRIVES))], tuple(rng.uniform(size=8)))
     better = 0.75 ** max(0, attempt - 3)
-    noise = max(LEAST_NOISE, _log_uniform(rng, *NOISE) * better)
-    torque_noise = max(LEAST_NOISE, _log_uniform(rng, *NOISE) * better)
+    noise = max(LEAST_NOISE, log_uniform(rng, *NOISE) * better)
+    torque_noise = max(LEAST_NOISE, log_uniform(rng, *NOISE) * better)
     motion = str(rng.choice(motions))
     sensors = str(rng.choice(list(SENSORS), p=(0.2, 0.3, 0.3, 0.2)))
     if motion == "locked":
         sensors = str(rng.choice(["motor", "torque sensor"]))
     # The clock of the plant is a whole multiple of the log's.
-    rate = 10000.0 / round(10000.0 / _log_uniform(rng, *RATE_HZ))
+    rate = 10000.0 / round(10000.0 / log_uniform(rng, *RATE_HZ))
     count = int(rng.choice([1, 2, 3, 4], p=(0.7, 0.15, 0.1, 0.05)))
     span = LONG_SECONDS if rng.random() < LONG_SHARE else SECONDS
-    seconds = max(_log_uniform(rng, *span), max((h.seconds for h in hidden), default=0.0))
+    seconds = max(log_uniform(rng, *span), max((h.seconds for h in hidden), default=0.0))
     first = Setup(
         drive=drive,
         motion=motion,
@@ -214,9 +211,9 @@ def _setups(
         temperature=bool(rng.random() < (0.5 if any(h.name == "thermal_friction" for h in hidden) else 0.25)),
         noise=noise,
         torque_noise=torque_noise,
-        step=_log_uniform(rng, *STEP),
-        torque_step=_log_uniform(rng, *TORQUE_STEP),
-        jitter=_log_uniform(rng, 0.002, 0.02) if rng.random() < JITTER_SHARE else 0.0,
+        step=log_uniform(rng, *STEP),
+        torque_step=log_uniform(rng, *TORQUE_STEP),
+        jitter=log_uniform(rng, 0.002, 0.02) if rng.random() < JITTER_SHARE else 0.0,
         speed=_speed(wanted, motion, rng),
         lacks=tuple(name for h in hidden for name in h.lacks),
         algebraic_sign=bool(
@@ -245,7 +242,7 @@ def _setups(
 def _speed(wanted: Wanted, motion: str, rng: np.random.Generator) -> float:
     if motion == "locked":
         return float(rng.uniform(0.6, 1.0))
-    return _log_uniform(rng, *SPEED) * max((h.speed for h in wanted.hidden), default=1.0)
+    return log_uniform(rng, *SPEED) * max((h.speed for h in wanted.hidden), default=1.0)
 
 
 def _plant(wanted: Wanted, setup: Setup, which: list[int]) -> Changes:

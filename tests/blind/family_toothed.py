@@ -14,24 +14,27 @@ own numbers.
 from __future__ import annotations
 
 import math
-import zlib
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from contract import Case, Kind, Measured
 from drawing import (
-    PARAMETERS,
     SENSORS,
     SKIP_S,
     Drive,
     Sensing,
+    Try,
     base_yaml,
     draw_drive,
     draw_lengths,
+    draw_parameters,
     draw_sensing,
+    first_near,
+    kind_of,
     log_uniform,
     off,
+    said,
     slower,
     visible,
 )
@@ -189,32 +192,26 @@ class Visibility:
 
 def draw(number: int, seed: int) -> Case:
     """A case; everything follows from the two numbers."""
-    kind, turn = KINDS[number % len(KINDS)], number // len(KINDS) + seed
-    best: tuple[float, Case] | None = None
-    for attempt in range(TRIES):
-        rng = np.random.default_rng([seed, number, attempt, zlib.crc32(FAMILY.encode())])
+
+    def one(rng: np.random.Generator) -> Try | None:
         try:
-            near, case = _drawn(kind, turn, number, seed, rng)
+            return _drawn(number, seed, rng)
         except PhysicsError:
-            continue  # teeth softer than the catalogue's whole drive
-        if near > 0.5:
-            return case
-        if best is None or near > best[0]:
-            best = (near, case)
-    if best is None:
-        raise ArithmeticError(f"{FAMILY} {number}/{seed}: no drive of {TRIES} could be built")
-    return best[1]
+            return None  # teeth softer than the catalogue's whole drive
+
+    return first_near(FAMILY, number, seed, TRIES, one)
 
 
-def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generator) -> tuple[float, Case]:
+def _drawn(number: int, seed: int, rng: np.random.Generator) -> Try:
     """The least part of a wanted strength that is reached, and the case."""
+    kind, turn = kind_of(number, seed, KINDS)
     gapped = kind == "pair" or (kind == "effect" and number % len(KINDS) in (1, 4, 7))
     place = 3 * turn + {2: 0, 6: 1, 5: 2}.get(number % len(KINDS), 0)
     h = EFFECTS[place % len(EFFECTS)] if kind == "pair" or (kind == "effect" and not gapped) else None
     kinds = [k for k in SENSORS if not (gapped or (h and h.needs)) or "output_angle" in SENSORS[k]]
     names: tuple[str, ...] = ()
     if kind == "parameter":
-        names = tuple(str(n) for n in rng.choice(list(PARAMETERS), int(rng.integers(1, 3)), replace=False))
+        names = draw_parameters(rng)
     arm = bool({"mass", "load-dependent loss"} & set(names) or (h and h.loaded) or rng.random() < 0.6)
     d = draw_drive(rng, arm=arm)
     sensing = draw_sensing(
@@ -259,13 +256,9 @@ def _drawn(kind: Kind, turn: int, number: int, seed: int, rng: np.random.Generat
         *([GAP] if gapped else []),
         *([HYSTERESIS if "hysteresis" in n else frozenset({n}) for n in effects]),
     ]
-    setup = {
-        "rate_hz": sensing.rate, "encoder_step_over_noise": sensing.coarseness,
-        "sensors": sensing.kind, "seconds": [float(r.time[-1]) for r in records[: len(given)]],
-        "records": len(given), "held": how, "motion": tuple(chosen), "temperature": sensing.temperature,
-        "formula": "other" if gapped else "catalogue", "mesh": mesh.model, "gap": teeth.gap,
-        "load": "arm" if d.arm else "inertia", "size": d.size, "ratio": d.ratio, "changes": effects,
-        "noise": {c: sensing.sigma(c) for c in sensing.channels},
+    setup = said(d, sensing, records[: len(given)]) | {
+        "held": how, "motion": tuple(chosen), "formula": "other" if gapped else "catalogue",
+        "mesh": mesh.model, "gap": teeth.gap, "changes": effects,
     }  # fmt: skip
     return near, Case(
         f"{FAMILY}/{kind}/{what}/{number}/{seed}", FAMILY, kind, tuple(right), tuple(records[: len(given)]),

@@ -29,6 +29,18 @@ def test_orders_2_and_2_02_are_told_apart_by_a_record_that_is_long_enough(tmp_pa
     assert lines[0].amplitude == pytest.approx(0.01, rel=0.25)
 
 
+def test_lines_that_are_close_do_not_pull_at_one_another(tmp_path):
+    """Orders 2 and 1.98 over 70 turns, 1.4 lines' widths apart, the weaker beside the stronger's skirt."""
+    t = np.arange(1800) / 250.0
+    angle = 2 * np.pi * (10.0 * t + 0.3 * np.sin(t))
+    rng = np.random.default_rng(1)
+    error = 3.5 * np.sin(2 * angle) + 2.5 * np.sin(1.98 * angle + 2.0) + 5.0 * rng.standard_normal(len(t))
+    record = Record("r", t, {"motor_angle": angle, "motor_torque": error})
+    lines = order_lines(Bench(predictors([record], 101.0)), [error], "motor_torque")
+    found = sorted(line.order for line in lines[:2])
+    assert found == pytest.approx([1.98, 2.0], abs=0.006)
+
+
 def stribeck(angle, velocity):
     """Hess and Soom's curve, not the catalogue's Gaussian."""
     return 0.05 * velocity / np.sqrt(velocity**2 + 0.1) / (1 + (velocity / 6) ** 2)

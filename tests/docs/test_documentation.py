@@ -16,7 +16,15 @@ from ruamel.yaml import YAML
 
 import hdsim
 from hdsim.cli import COMMANDS
+from hdsim.diagnose.experiments import LONGEST_S
+from hdsim.diagnose.following import WEAK
+from hdsim.diagnose.verdict import NamedEffect, Verdict
+from hdsim.effects import catalogue
+from hdsim.estimate.check import LONGEST_GAP_S, SLOWEST_HZ
+from hdsim.estimate.found import Gap
+from hdsim.estimate.records import FEWEST_SAMPLES, SHORTEST_S
 from hdsim.scenario import Scenario, json_schema
+from hdsim.tell.wording import MUCH_NOISE, MUCH_STRUCTURE, SURE
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -75,6 +83,34 @@ def test_scenarios_in_the_documentation_are_valid(text: str, tmp_path: Path) -> 
     assert hdsim.load_scenario(path).drive.rated_torque_nm > 0
 
 
+@pytest.mark.parametrize("page", ["diagnose", "architecture", "fit"])
+def test_named_files_are_there(page: str) -> None:
+    text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
+    there = {path.name for path in (ROOT / "hdsim").rglob("*.py")}
+    assert {name for name in re.findall(r"`(\w+\.py)`", text) if name not in there} == set()
+    paths = re.findall(r"`((?:hdsim|tests|scenarios)/[\w/.]+)`", text)
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_the_page_of_the_diagnosis_has_the_programs_own_figures() -> None:
+    text = " ".join((DOCS / "diagnose.md").read_text(encoding="utf-8").split())
+    least = f"{FEWEST_SAMPLES} samples over {SHORTEST_S:g} s at {SLOWEST_HZ:g} Hz or more"
+    assert f"{least}, without gaps above {LONGEST_GAP_S:g} s" in text
+    assert f"a single name below {WEAK:.0%}".replace("%", " %") in text
+    assert f"experiments of up to {LONGEST_S:g} s" in text
+    very, sure, fairly = (round(100 * least) for least, _ in SURE[:3])
+    assert f"very sure from {very} %, sure from {sure} %, fairly sure from {fairly} %" in text
+    assert (MUCH_NOISE, MUCH_STRUCTURE) == (2.0, 0.1)
+    assert "more than twice its noise or more than a tenth of the structure" in text
+
+
+def test_the_page_of_the_diagnosis_has_every_field_of_the_verdict() -> None:
+    section = (DOCS / "diagnose.md").read_text(encoding="utf-8").split("## verdict.json")[1].split("## ")[0]
+    named = set(re.findall(r"`(\w+)`", section))
+    fields = {*Verdict.model_fields, *NamedEffect.model_fields, *Gap.model_fields}
+    assert fields - named == set()
+
+
 def test_the_readme_has_a_whole_scenario() -> None:
     assert any(
         {"drive", "command", "load", "run"} <= set(YAML(typ="safe").load(t)) for t in blocks(README, "yaml")
@@ -85,6 +121,11 @@ def test_the_schema_beside_the_scenarios_is_current() -> None:
     path = ROOT / "scenarios" / "scenario.schema.json"
     stored = json.loads(path.read_text(encoding="utf-8"))
     assert stored == json.loads(json.dumps(json_schema(Scenario))), "run: make schema"
+
+
+def test_the_readme_counts_the_effects() -> None:
+    many = len(set(catalogue()) - {"table"})  # a curve for what is no effect of the catalogue
+    assert f"{many} further physical effects" in README.read_text(encoding="utf-8")
 
 
 def test_the_readme_lists_every_command() -> None:

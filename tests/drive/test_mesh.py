@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hdsim.contact import dead_zone
-from hdsim.drive import _mesh
+from hdsim.drive import _mesh_layout, _teeth, _teeth_table
 from hdsim.drive.model import Model
 from hdsim.drive.parameters import Drive
 
@@ -33,7 +33,7 @@ def potential(teeth: Any, x: float, angle: float) -> float:
             s = np.clip((half + edge - abs(phi)) / (2 * edge), 0, 1)
             weights[j] = s**3 * (10 - 15 * s + 6 * s**2)
         else:
-            gap += teeth.parameters[_mesh.CLEARANCE] * (1 - np.cos(2 * phi)) / 2
+            gap += teeth.parameters[_mesh_layout.CLEARANCE] * (1 - np.cos(2 * phi)) / 2
         depths[j] = abs(dead_zone(x + teeth.pitch_errors_m[j], gap))
     return float(weights @ teeth.law.energy(depths))
 
@@ -43,7 +43,7 @@ def test_potential_is_the_sum_over_the_teeth(kind: str) -> None:
     teeth = teeth_of({"engagement": {"kind": kind}, "pitch_error_m": 5e-7})
     for x in (-6e-6, -1e-6, 2e-6, 5e-6, 1e-5):
         for angle in (0.0, 0.3, 2.9, -17.0):
-            compiled = _mesh.teeth_potential(teeth.parameters, x, angle)[0]
+            compiled = _teeth.teeth_potential(teeth.parameters, x, angle)[0]
             assert compiled == pytest.approx(potential(teeth, x, angle), rel=2e-5, abs=1e-12)
 
 
@@ -64,7 +64,7 @@ def test_derivatives_are_those_of_the_potential(name: str, x: float, angle: floa
     parameters = MESHES[name].parameters
 
     def at(dx: float, da: float) -> Any:
-        return np.array(_mesh.teeth_potential(parameters, x + dx, angle + da))
+        return np.array(_teeth.teeth_potential(parameters, x + dx, angle + da))
 
     hx, ha = 1e-10, 1e-6
     here = at(0, 0)
@@ -83,7 +83,7 @@ def test_smooth_dead_zone_is_the_documented_one() -> None:
     from hdsim.contact import smooth_dead_zone
 
     for x, gap in ((1.4e-6, 1.5e-6), (1.6e-6, 1.5e-6), (5e-7, 1e-7), (1e-5, 1.5e-6)):
-        assert _mesh.smooth_depth(x, gap, 2e-7)[0] == pytest.approx(
+        assert _teeth.smooth_depth(x, gap, 2e-7)[0] == pytest.approx(
             float(smooth_dead_zone(x, gap, 2e-7)), rel=1e-12
         )
 
@@ -91,9 +91,9 @@ def test_smooth_dead_zone_is_the_documented_one() -> None:
 def test_tooth_forces_add_up_to_the_mesh_force() -> None:
     for teeth in MESHES.values():
         forces, angles = np.zeros(teeth.count), np.zeros(teeth.count)
-        _mesh.tooth_forces(teeth.parameters, 8e-6, 1.234, forces, angles)
+        _teeth.tooth_forces(teeth.parameters, 8e-6, 1.234, forces, angles)
         assert np.sum(forces) == pytest.approx(
-            _mesh.teeth_potential(teeth.parameters, 8e-6, 1.234)[1], rel=1e-12
+            _teeth.teeth_potential(teeth.parameters, 8e-6, 1.234)[1], rel=1e-12
         )
         assert np.all(np.abs(angles) <= np.pi + 1e-12)
 
@@ -102,7 +102,7 @@ def test_contact_never_pulls() -> None:
     for teeth in MESHES.values():
         forces, angles = np.zeros(teeth.count), np.zeros(teeth.count)
         for x in (-1e-5, 1e-5):
-            _mesh.tooth_forces(teeth.parameters, x, 0.7, forces, angles)
+            _teeth.tooth_forces(teeth.parameters, x, 0.7, forces, angles)
             assert np.all(np.sign(forces) * np.sign(x) >= 0)
 
 
@@ -113,8 +113,8 @@ def test_tabulated_mesh_states_an_error_that_holds() -> None:
     rng = np.random.default_rng(5)
     reach = exact.lever_m * exact.loaded(52.0)[0]
     for x, angle in zip(rng.uniform(-reach, reach, 300), rng.uniform(-5, 5, 300), strict=True):
-        torque = _mesh.table_potential(table.parameters, x, angle)[1] * table.lever_m
-        wanted = _mesh.teeth_potential(exact.parameters, x, angle)[1] * exact.lever_m
+        torque = _teeth_table.table_potential(table.parameters, x, angle)[1] * table.lever_m
+        wanted = _teeth.teeth_potential(exact.parameters, x, angle)[1] * exact.lever_m
         assert abs(torque - wanted) < 1.5 * table.table_error * 52.0
 
 

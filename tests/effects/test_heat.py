@@ -17,8 +17,9 @@ from test_every_effect import SIZES
 
 import hdsim.drive.model as drive_model
 import hdsim.kernel as k
-from hdsim.actuation.shapes import Ramp, Sine
+from hdsim.actuation.shapes import Ramp
 from hdsim.actuation.signal_data import SignalData
+from hdsim.actuation.waves import Sine
 from hdsim.drive.friction import contribute_friction
 from hdsim.drive.parameters import Drive, Friction
 from hdsim.effects import catalogue

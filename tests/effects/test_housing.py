@@ -10,8 +10,9 @@ import pytest
 from pydantic import ValidationError
 from scipy.linalg import eigh, expm
 
-from hdsim.actuation.shapes import Hold, Sine
+from hdsim.actuation.shapes import Hold
 from hdsim.actuation.signal_data import SignalData
+from hdsim.actuation.waves import Sine
 from hdsim.drive.model import Model
 from hdsim.drive.parameters import Drive
 from hdsim.effects.base_flexibility import BaseFlexibility

@@ -9,7 +9,7 @@ import pytest
 from harness import FakeBuilder
 from pydantic import ValidationError
 
-from hdsim.effects.sensors import Encoder, SensorRipple, Sensors, TorqueSensor, VelocitySensor
+from hdsim.effects.sensors import Encoder, EncoderRipple, SensorRipple, Sensors, TorqueSensor, VelocitySensor
 from hdsim.errors import InputError
 
 TIMES = np.linspace(0.0, 2.0, 20001)
@@ -128,3 +128,22 @@ def test_resolution_rounds_the_torque() -> None:
 def test_a_differenced_speed_refuses_a_tachometers_settings() -> None:
     with pytest.raises(ValidationError, match="tachometer"):
         VelocitySensor(noise_rad_per_s=0.1)
+
+
+def test_an_encoders_ripple_counts_the_turns_of_the_shaft_that_it_names() -> None:
+    ripple = (
+        EncoderRipple(order=2, per="wave_generator_turn", amplitude_arcsec=3.0, phase_deg=40),
+        EncoderRipple(order=3, per="output_turn", amplitude_arcsec=5.0),
+    )
+    sensors = Sensors(
+        output_angle=Encoder(ripple=ripple),
+        output_velocity=VelocitySensor(window_s=1e-3),
+    ).readers(0)
+    reader = sensors["output_angle"]
+    assert set(reader.needs) == {"motor_angle", "output_angle"}
+    context = {"motor_angle": 100 * RAMP, "output_angle": RAMP}
+    arcsec = math.radians(1 / 3600)
+    expected = 3 * arcsec * np.sin(200 * RAMP + math.radians(40)) + 5 * arcsec * np.sin(3 * RAMP)
+    assert np.allclose(reader.read(TIMES, RAMP, TIMES, context) - RAMP, expected, atol=1e-3 * arcsec)
+    # The speed is the difference of the same readings, so it needs the same channels.
+    assert set(sensors["output_velocity"].needs) == {"motor_angle", "output_angle"}

@@ -104,6 +104,7 @@ def test_numbers_are_found_at_their_fields_with_unit_and_bounds(tmp_path):
     frees = {f.name: f for f in base_freedoms(state(tmp_path), ["motor_torque", "output_angle"])}
     assert {name: free.unit for name, free in frees.items()} == {
         "drive.torsion.stiffness_k1_nm_per_rad": "N m/rad",
+        "drive.torsion.torque_t1_nm": "N m",
         "drive.torsion.damping_nm_s_per_rad": "N m s/rad",
         "drive.inertia.motor_kg_m2": "kg m^2",
         "drive.friction.coulomb_nm": "N m",

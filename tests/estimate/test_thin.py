@@ -88,6 +88,7 @@ def test_means_keep_the_numbers_and_the_verdict(tmp_path):
     """The same swing of a rigid drive read eight times as fast: the same numbers, within their intervals."""
     sys.path.insert(0, str(Path(__file__).parents[1] / "diagnose"))
     import diagnose_bench as bench
+
     from hdsim.diagnose.workflow import diagnose
 
     kept, bench.RATE = bench.RATE, 4000.0

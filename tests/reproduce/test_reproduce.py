@@ -8,10 +8,11 @@ from click.testing import CliRunner
 
 from hdsim.errors import InputError
 from hdsim.reproduce import drive, paper, stiffness
+from hdsim.reproduce.checks import compute, names
 from hdsim.reproduce.commands import reproduce
 from hdsim.reproduce.page import headlines, sections, to_html
 from hdsim.reproduce.report import print_rows, to_markdown, write
-from hdsim.reproduce.rows import Verdict, compute, names
+from hdsim.reproduce.rows import Verdict
 from hdsim.reproduce.typeset import typeset
 
 QUICK = [n for n in names() if not n.startswith(("round-trip", "boundary", "drive"))]

@@ -11,7 +11,7 @@ from hdsim.errors import InputError
 from hdsim.kernel import system as system_kernel
 from hdsim.simulation.rosenbrock import Rodas4
 from hdsim.simulation.solvers import METHODS, Statistics, integrate
-from hdsim.simulation.system import System
+from hdsim.system import System
 
 every_method = pytest.mark.parametrize("method", METHODS)
 

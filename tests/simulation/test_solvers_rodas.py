@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from hdsim.kernel import system as system_kernel
 from hdsim.simulation import _rodas as c
 from hdsim.simulation.rosenbrock import Rodas4, rodas4_through
-from hdsim.simulation.system import System
+from hdsim.system import System
 
 
 def _tableau():

@@ -14,9 +14,11 @@ from hdsim.simulation.simulate import simulate
 from hdsim.study.bench import frequency, friction, positioning, settling, torsion, transmission
 from hdsim.study.bench.report import catalogue_lines, default_effects, figures_of, run_procedure
 from hdsim.study.commands import bench, presets
+from hdsim.study.known_metrics import find_metric, metrics
+from hdsim.study.known_procedures import find_procedure, procedures
 from hdsim.study.metrics.friction import operating_points
 from hdsim.study.metrics.positioning import approaches, positioning_errors
-from hdsim.study.registry import BenchRun, find_metric, find_procedure, metrics, procedures
+from hdsim.study.registry import BenchRun
 
 ARCSEC = 180 * 3600 / math.pi
 SEED = {"preset": "seed-2021"}

@@ -5,7 +5,8 @@ import pytest
 from engine_cases import SCENARIO
 
 from hdsim.scenario import Scenario
-from hdsim.study.engine.budget import causes, error_budget, plot_budget
+from hdsim.study.engine.budget import error_budget, plot_budget
+from hdsim.study.engine.causes import causes
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 ARCSEC = math.degrees(1) * 3600

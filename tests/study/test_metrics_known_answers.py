@@ -10,9 +10,9 @@ from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
 from hdsim.simulation.simulate import simulate
 from hdsim.study.bench import torsion, transmission
+from hdsim.study.known_metrics import find_metric
 from hdsim.study.metrics.torsion import torsion_loop
 from hdsim.study.metrics.transmission import orders, transmission_error
-from hdsim.study.registry import find_metric
 
 ARCSEC = 180 * 3600 / math.pi
 SEED = {"preset": "seed-2021"}

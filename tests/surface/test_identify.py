@@ -12,13 +12,8 @@ from hdsim.surface import Flank, structure_function
 from hdsim.surface._power_law import fit_power_laws
 from hdsim.surface.commands import surface
 from hdsim.surface.files import read_heights
-from hdsim.surface.identify import (
-    detrended,
-    identify,
-    implied_heights,
-    measured_structure_function,
-    synthetic_profiles,
-)
+from hdsim.surface.identify import identify, implied_heights
+from hdsim.surface.sampled import detrended, measured_structure_function, synthetic_profiles
 
 PAIR = Flank(2.5351, 1.55e-10)
 CS = Flank(2.4272, 1.245e-10)

@@ -76,6 +76,18 @@ def test_nothing_is_very_sure_while_much_is_left(evidence, left):
     assert "very" not in sure.sentence.lower()
 
 
+def test_what_only_an_effect_without_a_name_explains_is_left_too():
+    unsure = law("unbalance", gain=0.15, sampled=0.4, of_left=0.1, beyond=0.02, own_left=0.9)
+    found = told(EFFECT.model_copy(update={"laws": [*EFFECT.laws, unsure], "explained": 0.99}))
+    assert [effect.name for effect in found.verdict.effects] == ["motor_torque_ripple"]
+    gap = GAP.model_copy(update={"after": 2.5 * GAP.noise})
+    found = type(found)(found.verdict.model_copy(update={"gap": {"motor_torque": gap}}), found.evidence)
+    assert (
+        much_left(found) == "2.5 times the noise of the motor torque and 16\u00a0% of the structure are left"
+    )
+    assert sureness(found).words != "Very sure"
+
+
 def test_what_is_left_is_on_the_page(tmp_path):
     assert "<p class='left'>But 16\u00a0% of the structure is left.</p>" in page(
         confident(0.995, explained=0.84), tmp_path

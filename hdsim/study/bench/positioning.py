@@ -13,9 +13,10 @@ from hdsim.plot import style
 from hdsim.study.bench._figure import SHADES, page, zero_lines
 from hdsim.study.bench._scenario import bench, with_bearing
 from hdsim.study.bench._servo import moves_between, position_loop
+from hdsim.study.known_metrics import find_metric
 from hdsim.study.metrics._spans import ARCSEC
 from hdsim.study.metrics.positioning import approaches, positioning_errors
-from hdsim.study.registry import BenchRun, Procedure, find_metric, procedure
+from hdsim.study.registry import BenchRun, Procedure, procedure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

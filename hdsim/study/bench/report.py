@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from hdsim.drive.parameters import Drive
 from hdsim.errors import HdsimError
+from hdsim.study.known_metrics import find_metric
 from hdsim.study.metrics._spans import ARCSEC
-from hdsim.study.registry import BenchRun, Procedure, find_metric
+from hdsim.study.registry import BenchRun, Procedure
 
 if TYPE_CHECKING:
     from hdsim.drive.catalogue import CatalogueFigures

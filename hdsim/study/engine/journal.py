@@ -26,9 +26,7 @@ def code_version() -> str:
     """Version of hdsim with a hash of its source files: results of other code are not continued."""
     from importlib.metadata import version
 
-    import hdsim
-
-    root = Path(hdsim.__file__).parent
+    root = Path(__file__).parents[2]
     total = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
         total.update(path.relative_to(root).as_posix().encode())

@@ -106,7 +106,7 @@ def plan(study: Study, source: Source | None = None) -> Plan:
     """
     from hdsim.scenario.model import Scenario
     from hdsim.study.engine.design import runs
-    from hdsim.study.registry import find_metric
+    from hdsim.study.known_metrics import find_metric
 
     source = source or Source(study.model_dump(mode="json"), {(): Mark(study.name or "study")})
     scenario, recipe = base_recipe(study.base, tuple(study.parameters), source)
@@ -137,7 +137,7 @@ def base_recipe(base: Base, names: tuple[str, ...], source: Source) -> tuple[Sce
     """
     from hdsim.drive.parameters import Drive
     from hdsim.scenario.model import Effects, Scenario
-    from hdsim.study.registry import find_procedure
+    from hdsim.study.known_procedures import find_procedure
 
     if base.scenario is not None:
         part = _part(source, ("base", "scenario"), base.scenario)

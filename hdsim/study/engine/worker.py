@@ -98,7 +98,7 @@ def _base(base: str, drive: str, remade: str) -> dict[str, Any]:
         if PRESET in changes:
             data["drive"] = json.loads(drive) | {"preset": changes[PRESET]}
         return data
-    from hdsim.study.registry import find_procedure
+    from hdsim.study.known_procedures import find_procedure
 
     section = dict(given["drive"])
     if PRESET in changes:
@@ -211,7 +211,7 @@ def record(scenario: Scenario, log: Path | None = None) -> tuple[Recording, str]
 
 def measured(names: Sequence[str], recording: Recording, scenario: Scenario) -> tuple[dict[str, float], str]:
     """Metrics of a run, and why those that are missing could not be taken."""
-    from hdsim.study.registry import find_metric
+    from hdsim.study.known_metrics import find_metric
 
     values: dict[str, float] = {}
     reasons: list[str] = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.actuation.shapes import Multisine
+from hdsim.actuation.waves import Multisine
 from hdsim.errors import InputError
 from hdsim.recording import Recording
 from hdsim.study.registry import metric

@@ -45,7 +45,7 @@ class System:
         return len(self.y0)
 
     def __post_init__(self) -> None:
-        from hdsim.simulation import _evaluate
+        from hdsim import _evaluate
 
         self._call = _evaluate.evaluate
         n = self.size

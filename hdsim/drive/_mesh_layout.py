@@ -1,0 +1,41 @@
+"""What a mesh kernel is given and what it returns, by place (see ``hdsim.drive._mesh``)."""
+
+# Result of a mesh kernel.
+ENERGY = 0
+GRADIENT = 1  # m, f, o
+HESSIAN = 4  # mm, mf, mo, ff, fo, oo
+MESH_TWIST = 10
+TWIST = 11
+ENGAGED = 12  # number of teeth that carry load
+RESULT_SIZE = 16
+
+# Parameters of a toothed mesh: a header, then the arrays at their offsets.
+TEETH = 0
+GAIN = 1  # g
+OUTPUT_SHARE = 2  # nu
+INVERSE_RATIO = 3
+LEVER = 4  # R
+KIND = 5  # 0 window, 1 clearance
+PLATEAU = 6  # angle where the window starts to fall
+BORDER = 7  # angle where it has reached zero
+CLEARANCE = 8
+KAPPA = 9
+CONTACT_STEP = 10
+CONTACT_CELLS = 11
+CONTACT_AT = 12
+SPRING_STEP = 13
+SPRING_CELLS = 14
+SPRING_AT = 15
+GAP_CELLS = 16
+GAP_AT = 17
+PITCH_ERROR_AT = 18
+EXTRA_GAP = 19
+LARGEST_PITCH_ERROR = 20
+TABLE_TWIST_STEP = 21
+TABLE_TWIST_NODES = 22
+TABLE_ANGLE_NODES = 23
+TABLE_AT = 24
+TABLE_TWIST_START = 25
+SMOOTHING = 26  # half-width of the dead-zone's rounded corners, m
+CONSTANT_GAPS_AT = 27  # constant half-gaps of the teeth, twice over as the pitch errors; 0: none
+HEADER = 28
