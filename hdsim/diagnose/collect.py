@@ -130,7 +130,9 @@ def _rest(bench: Bench, predictions: Sequence[Array]) -> RestEvidence | None:
     for series, residual in zip(bench.series, bench.residuals(predictions), strict=True):
         if series.record >= bench.training or not series.train.any() or series.noise <= 0:
             continue
-        times = float(np.sqrt(np.mean((residual[series.train] / series.noise) ** 2)))
+        # In units of a single reading's noise, however many a sample is the mean of.
+        beyond = float(np.mean(residual[series.train] ** 2)) - series.noise**2
+        times = float(np.sqrt(max(1.0 + beyond / series.reading**2, 0.0)))
         if worst is None or times > worst.times_noise:
             name = bench.predictors[series.record].record.name
             worst = RestEvidence(record=name, channel=series.channel, times_noise=times)

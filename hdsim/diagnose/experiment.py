@@ -140,7 +140,7 @@ def scenario_text(experiment: Experiment, extends: str, sentence: str, rate_hz: 
 
 
 def _rate(bench: Bench) -> float:
-    return 1.0 / bench.predictors[0].record.period_s
+    return 1.0 / bench.predictors[0].record.as_read.period_s
 
 
 def _repetition(bench: Bench) -> Experiment:

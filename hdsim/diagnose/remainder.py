@@ -32,13 +32,15 @@ def remainder(bench: Bench, predictions: Sequence[Array]) -> Remainder | None:
         if series.record >= bench.training or not series.train.any():
             continue
         record = bench.predictors[series.record].record
-        square = (residual[series.train] / max(series.noise, 1e-300)) ** 2
+        # In units of a single reading's noise, however many a sample is the mean of.
+        reading = max(series.reading, 1e-300)
+        square = 1.0 + (residual[series.train] ** 2 - series.noise**2) / reading**2
         block = series.block[series.train] - series.block.min()
         counts = np.bincount(block)
         used = counts > 0
         powers = np.bincount(block, square)[used] / counts[used]
-        ratio = float(np.sqrt(powers.max()))
-        if np.sqrt(square.mean()) < EXCESS or (worst is not None and worst.times_noise > ratio):
+        ratio = float(np.sqrt(max(powers.max(), 0.0)))
+        if np.sqrt(max(square.mean(), 0.0)) < EXCESS or (worst is not None and worst.times_noise > ratio):
             continue
         beyond = np.maximum(powers - 1.0, 0.0)
         order = np.argsort(-beyond)

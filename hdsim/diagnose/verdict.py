@@ -105,5 +105,8 @@ class Verdict(Part):
     """What to measure next, where these data leave names that they cannot tell apart."""
     scenario: str | None = None
     """The scenario that extends the base with what was found."""
+    readings: int = 1
+    """Successive readings whose means were compared, of the record that was read fastest; all numbers, gaps
+    and their noise are of these means."""
     seconds: dict[str, float] = {}
-    """Time spent in each step."""
+    """Processor time spent in each step, s."""

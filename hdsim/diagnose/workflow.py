@@ -25,13 +25,14 @@ from hdsim.estimate.data_problems import Check
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.estimate.numbers import Interval
-from hdsim.estimate.opening import bench_for, checked
+from hdsim.estimate.opening import bench_for, checked, locked_side
 from hdsim.estimate.predict import LoadSource, PredictionError
 from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit, tie, together
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, suspicions
+from hdsim.estimate.thin import readings_of_means
 from hdsim.estimate.write import fitted_numbers
 
 if TYPE_CHECKING:
@@ -107,16 +108,17 @@ def _diagnosed(
     @contextlib.contextmanager
     def step(name: str, text: str) -> Iterator[None]:
         tell(text)
-        started = time.perf_counter()
+        started = time.process_time()
         yield
-        seconds[name] = round(seconds.get(name, 0.0) + time.perf_counter() - started, 3)
+        seconds[name] = round(seconds.get(name, 0.0) + time.process_time() - started, 3)
 
     with step("check", "checking the data"):
         records, held, checks = checked(measured, scenario, holdout=holdout, force=force)
         problems = [problem for check in checks for problem in check.problems]
-    with step("compare", "predicting the measured channels"):
-        bench = bench_for(records, held, scenario, load)
     start = state_of(scenario)
+    with step("compare", "predicting the measured channels"):
+        readings = readings_of_means([*records, *held], load=load, locked=locked_side(scenario))
+        bench = bench_for(records, held, scenario, load, readings=readings)
     with step("refit", "re-fitting the model's own numbers"):
         try:
             base = refit(bench, start)
@@ -179,6 +181,7 @@ def _diagnosed(
         "confidence": decision.certainty,
         "because": decision.because,
         "curve": curve.found() if curve is not None else None,
+        "readings": readings,
         "seconds": seconds,
     }
     patterned = evidence.left_chance <= RULES.chance and evidence.left >= RULES.structured

@@ -45,6 +45,7 @@ class Series:
         hold: samples that only the proof sees.
         block: shape (n,), number of the block that each sample belongs to, unique over all records.
         noise: standard deviation of the channel's noise.
+        reading: the same of a single reading, where a sample is the mean of several.
         sigma: standard deviation by which residuals are divided.
     """
 
@@ -55,6 +56,7 @@ class Series:
     hold: Mask
     block: NDArray[np.int64]
     noise: float
+    reading: float
     sigma: float = 1.0
 
 
@@ -85,10 +87,10 @@ class Bench:
         held = stretch % 3 == 2 if split else np.full(n, own_record)
         usable = (record.time > SETTLE_S) & record.trusted[predictor.plan.motion]
         for channel in predictor.plan.channels:
-            measured, trusted, noise = predictor.measured(channel)
-            good = usable & trusted
+            measured, trusted, noise, reading = predictor.measured(channel)
+            good, own = usable & trusted, self.blocks + block
             self.series.append(
-                Series(index, channel, measured, good & ~held, good & held, self.blocks + block, noise)
+                Series(index, channel, measured, good & ~held, good & held, own, noise, reading)
             )
         self.blocks += count
 
@@ -124,7 +126,9 @@ class Bench:
                 rows = s.train | s.hold
                 if rows.any():
                     heard = float(np.hypot(s.noise, np.std(change[rows])))
-                    s.noise = max(s.noise, min(heard, left.get(s.channel, heard)))
+                    heard = max(s.noise, min(heard, left.get(s.channel, heard)))
+                    s.reading = float(np.hypot(s.reading, np.sqrt(heard**2 - s.noise**2)))
+                    s.noise = heard
 
     @property
     def channels(self) -> tuple[str, ...]:

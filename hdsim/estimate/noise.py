@@ -34,6 +34,53 @@ def noise_floor(values: Array, trusted: Mask) -> float:
     return max(white_noise(values, trusted), quantisation_step(values[trusted]) / math.sqrt(12.0))
 
 
+def step_of_means(values: Array, trusted: Mask, step: float, means: Array, readings: int) -> float:
+    """Step whose q / sqrt(12) is what a sensor's steps leave on means of successive readings, in their unit.
+
+    Errors of readings are apart where noise or motion takes each to a step of its own; the readings of a mean
+    that stay within one step err alike.
+
+    Args:
+        values: shape (n,), as read.
+        trusted: shape (n,), samples that count.
+        step: of the sensor.
+        means: shape (m,).
+        readings: of a mean.
+    """
+    if step == 0.0 or readings == 1:
+        return step
+    dithered = white_noise(values, trusted) >= step / math.sqrt(12.0)
+    if dithered:
+        return step / math.sqrt(readings)
+    crossed = np.clip(np.abs(np.diff(means)) / step, 1.0, readings)
+    return step * math.sqrt(float(np.mean(1.0 / crossed)))
+
+
+def noise_of_means(
+    values: Array, trusted: Mask, step: float, means: Array, whole: Mask, readings: int
+) -> float:
+    """Standard deviation of the noise on means of successive readings, in their unit.
+
+    White noise falls with the root of their number; noise that is not white by less, as differences of the
+    means tell, and none rises.
+
+    Args:
+        values: shape (n,), as read.
+        trusted: shape (n,), readings that count.
+        step: of the sensor.
+        means: shape (m,).
+        whole: shape (m,), means that count.
+        readings: of a mean.
+    """
+    white = white_noise(values, trusted)
+    single = max(white, step / math.sqrt(12.0))
+    if readings == 1:
+        return single
+    steps = step_of_means(values, trusted, step, means, readings) / math.sqrt(12.0)
+    least = min(max(white / math.sqrt(readings), steps), single)
+    return min(max(white_noise(means, whole), least), single)
+
+
 def quantisation_step(values: Array) -> float:
     """Step q of which all differences between readings are multiples, in their unit; 0 where there is none.
 

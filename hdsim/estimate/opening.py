@@ -11,6 +11,7 @@ from hdsim.estimate.check import check_record
 from hdsim.estimate.data_problems import Check
 from hdsim.estimate.predict import LoadSource, Locked, predictors
 from hdsim.estimate.records import Record, record_from
+from hdsim.estimate.thin import over, thinned
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -42,8 +43,20 @@ def checked(
     return records, held, checks
 
 
+def locked_side(scenario: Scenario) -> Locked:
+    """The side that a scenario locks, if any."""
+    if scenario.command.output.type == "locked":
+        return "output"
+    return "motor" if scenario.command.motor.type == "locked" else ""
+
+
 def bench_for(
-    records: Sequence[Record], held: Sequence[Record], scenario: Scenario, load: LoadSource | None = None
+    records: Sequence[Record],
+    held: Sequence[Record],
+    scenario: Scenario,
+    load: LoadSource | None = None,
+    *,
+    readings: int = 1,
 ) -> Bench:
     """The records with their predictors.
 
@@ -52,12 +65,17 @@ def bench_for(
         held: that only the proof sees; parts of the others when there are none.
         scenario: the model.
         load: where the load's torque comes from.
+        readings: successive readings of which means are taken, of the record that is read fastest; of the
+            others as many as come in the same time.
 
     Raises:
         InputError: nothing can be predicted.
     """
-    ratio, command = scenario.drive.ratio, scenario.command
-    locked: Locked = "motor" if command.motor.type == "locked" else ""
-    locked = "output" if command.output.type == "locked" else locked
+    span = readings * min(record.period_s for record in [*records, *held])
+    records, held = (
+        [thinned(record, over(record, span) if readings > 1 else 1) for record in many]
+        for many in (records, held)
+    )
+    ratio, locked = scenario.drive.ratio, locked_side(scenario)
     training = predictors(records, ratio, load=load, locked=locked)
     return Bench(training, predictors(held, ratio, load=load, locked=locked))

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hdsim.errors import InputError, PhysicsError
-from hdsim.estimate.noise import noise_floor, quantisation_step, white_noise
+from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import SlowPart, signal, smoothed
+from hdsim.estimate.spline import SlowPart, least_squares_spline, signal, smoothed
+from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked =
     Raises:
         InputError: nothing can be predicted; the message names what is missing.
     """
-    has = _readable(record)
+    has = record.readable
     moving = {c for c in has if float(np.ptp(record.filled(c))) > 0}
     if load is None:
         load = "load_torque" if "load_torque" in moving else "scenario"
@@ -129,11 +130,6 @@ def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked =
     return Plan(motion, load, tuple(predicted), locked)
 
 
-def _readable(record: Record) -> set[str]:
-    """Channels with more than a few readings that can be trusted."""
-    return {c for c, good in record.trusted.items() if good.sum() > 20}
-
-
 def _motor_locked(record: Record, moving: set[str]) -> Plan:
     """A drive that is twisted from its output: the torque follows from the angle."""
     if {"output_angle", "output_torque"} <= moving:
@@ -158,12 +154,14 @@ class Predictor:
     def __init__(self, record: Record, plan: Plan, ratio: float, rtol: float = RTOL) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
         turns, self._zero = 0, 0.0
-        if plan.motion == "motor_angle" and "output_angle" in _readable(record) and not plan.locked:
+        if plan.motion == "motor_angle" and "output_angle" in record.readable and not plan.locked:
             turns, self._zero = between_zeros(record, ratio)
         #: The prescribed reading, shape (n,), counted from the motor's zero that is next to the output's.
         values = self._reading = record.filled(plan.motion) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
-        breaks, coefficients = smoothed(record.time, values, motion=not plan.locked)
+        breaks, coefficients = smoothed(
+            record.time, values, motion=not plan.locked, step=self._step(plan.motion)
+        )
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
         self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
         coefficients = coefficients * self._factor
@@ -174,12 +172,13 @@ class Predictor:
         self.turn(0.0)
         self.load_torque: SignalData | None = None
         if plan.load != "scenario":
-            breaks, coefficients = smoothed(record.time, record.filled(plan.load))
+            step = self._step(plan.load)
+            breaks, coefficients = smoothed(record.time, record.filled(plan.load), step=step)
             sign = -1.0 if plan.load == "output_torque" else 1.0
             self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
         #: What a part may ask for beside the motion (``Builder.external``).
         self.signals: dict[str, SignalData] = {}
-        if "temperature" in _readable(record):
+        if "temperature" in record.readable:
             found = smoothed(record.time, record.filled("temperature"))
             self.signals["temperature"] = signal(*found, LEAD_IN_S)
         self._slow: SlowPart | None = None
@@ -212,11 +211,11 @@ class Predictor:
         Args:
             seed: of the draw.
         """
-        from scipy.interpolate import PPoly, make_lsq_spline
+        from scipy.interpolate import PPoly
 
         time, raw = self.record.time, self._reading
         smooth = self.motor_angle / self._factor
-        step = quantisation_step(raw[self.record.trusted[self.plan.motion]])
+        step = self._step(self.plan.motion)
         # A loop's hiccup is no noise of the sensor: the median does not see it.
         rest = raw - smooth
         left = min(float(np.var(rest)), float(np.median(np.abs(rest)) / 0.6745) ** 2)
@@ -227,7 +226,7 @@ class Predictor:
         knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
         found = copy(self)
         try:
-            pieces = PPoly.from_spline(make_lsq_spline(time, drawn, knots, k=3))
+            pieces = PPoly.from_spline(least_squares_spline(time, drawn, knots))
         except (ValueError, np.linalg.LinAlgError):
             return found  # a knot a sample, as of a motion without noise
         keep = np.diff(pieces.x) > 0
@@ -235,26 +234,43 @@ class Predictor:
         found.turn(0.0)
         return found
 
-    def measured(self, channel: str) -> tuple[Array, Mask, float]:
-        """What a predicted channel is compared with: readings (n,), which of them count (n,), their noise.
+    def _step(self, channel: str) -> float:
+        """Step of a channel's sensor, as it is felt in the record."""
+        raw, values = self.record.as_read, self.record.filled(channel)
+        good = raw.trusted[channel]
+        step = quantisation_step(raw.channels[channel][good])
+        return step_of_means(raw.channels[channel], good, step, values, self.record.readings)
+
+    def measured(self, channel: str) -> tuple[Array, Mask, float, float]:
+        """What a predicted channel is compared with.
 
         With both encoders the output's angle is read beside the motor's at the same moment: what a jittering
         clock, or the motor's encoder, puts on both falls out of their difference, the transmission error.
         Where that has less noise, the motor's reading less its smooth motion is taken out of the output's.
+
+        Returns:
+            Samples (n,), which of them count (n,), their noise, and that of a single reading.
         """
-        record = self.record
+        record, raw = self.record, self.record.as_read
         values, trusted = record.filled(channel), record.trusted[channel]
-        noise = noise_floor(record.channels[channel], trusted)
+        step = quantisation_step(raw.channels[channel][raw.trusted[channel]])
+
+        def noises(read: Array, good: Mask, step: float, means: Array, whole: Mask) -> tuple[float, float]:
+            single = noise_of_means(read, good, step, read, good, 1)
+            return noise_of_means(read, good, step, means, whole, record.readings), single
+
+        plain = noises(raw.channels[channel], raw.trusted[channel], step, values, trusted)
         if channel != "output_angle" or self.plan.motion != "motor_angle":
-            return values, trusted, noise
-        motor = record.filled("motor_angle")
-        both = trusted & record.trusted["motor_angle"]
-        beside = white_noise(values - motor / self.ratio, both)
-        step = max(quantisation_step(values[trusted]), quantisation_step(motor[both]) / abs(self.ratio))
-        beside = max(beside, step / np.sqrt(12.0))
-        if beside >= noise:
-            return values, trusted, noise
-        return values - (self._reading - self.motor_angle) / self.ratio, both, float(beside)
+            return values, trusted, *plain
+        motor, turned = record.filled("motor_angle"), raw.filled("motor_angle")
+        whole = trusted & record.trusted["motor_angle"]
+        good = raw.trusted[channel] & raw.trusted["motor_angle"]
+        step = max(step, quantisation_step(turned[good]) / abs(self.ratio))
+        read = raw.filled(channel) - turned / self.ratio
+        beside = noises(read, good, step, values - motor / self.ratio, whole)
+        if beside[0] >= plain[0]:
+            return values, trusted, *plain
+        return values - (self._reading - self.motor_angle) / self.ratio, whole, *beside
 
     def predict(self, candidate: Candidate) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
@@ -274,7 +290,8 @@ class Predictor:
             parts.append(MeasuredTorque(self.load_torque))
         elif load.torque is not None:
             # The scenario's load begins with the record, after the lead-in.
-            parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(LEAD_IN_S))))
+            late = LEAD_IN_S - self.record.begins_s
+            parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(late))))
         if self._zero:
             parts.append(Zero(self._zero))
         motions: dict[str, Any] = {"motor": self.motion}
@@ -318,23 +335,6 @@ class Predictor:
                 own = own - self._slow.of(own) if np.any(own) else own
                 found["output_torque"] = self._slow_torque + own
         return found
-
-
-def unloaded_angle(record: Record, angle: Array) -> float:
-    """Motor angle of a locked drive midway between its branches at zero torque, rad (0 without a torque).
-
-    Args:
-        record: the measured run.
-        angle: motor angle beside the output, shape (n,).
-    """
-    for channel in ("motor_torque", "output_torque"):
-        if channel in _readable(record):
-            torque = record.filled(channel)
-            small = np.abs(torque) < 0.05 * np.max(np.abs(torque))
-            if small.any():
-                low, high = np.quantile(angle[small], [0.05, 0.95])
-                return float(0.5 * (low + high))
-    return 0.0
 
 
 class PredictionError(ArithmeticError):

@@ -48,6 +48,9 @@ class Record:
         channels: shape (n,) each, SI units, by the contract's names.
         trusted: shape (n,) each: samples that are neither missing nor spikes.
         ratio: the ratio by which an import brought numbers to the other side of the gear, where it did.
+        source: the record as it was read, where this one has means of its readings.
+        readings: that a sample is the mean of.
+        begins_s: time of the first sample in the source, s.
     """
 
     name: str
@@ -55,6 +58,9 @@ class Record:
     channels: dict[str, Array]
     trusted: dict[str, Mask] = field(default_factory=dict)
     ratio: float | None = None
+    source: Record | None = None
+    readings: int = 1
+    begins_s: float = 0.0
 
     def __post_init__(self) -> None:
         for channel, values in self.channels.items():
@@ -69,6 +75,16 @@ class Record:
     def period_s(self) -> float:
         """Median time between samples, s."""
         return float(np.median(np.diff(self.time)))
+
+    @property
+    def as_read(self) -> Record:
+        """The record before any means were taken."""
+        return self.source or self
+
+    @property
+    def readable(self) -> set[str]:
+        """Channels with more than a few readings that can be trusted."""
+        return {c for c, good in self.trusted.items() if good.sum() > 20}
 
     def filled(self, channel: str) -> Array:
         """A channel with untrusted samples replaced by linear interpolation, shape (n,)."""

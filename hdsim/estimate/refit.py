@@ -160,7 +160,7 @@ def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:
 
     They come last: what is missing bends a delay as it bends any number, and a ripple hides behind one.
     """
-    period = bench.predictors[0].record.period_s
+    period = bench.predictors[0].record.as_read.period_s
     free = delay_freedoms(found.state, bench.channels, period, load_known=bench.load_known)
     if not free or any(each.step for each in found.frees):
         return None

@@ -21,11 +21,15 @@ TAIL_S = 0.02
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
 #: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
 STEPS_ALLOW = 1.1
+#: Part of its own size that the other splines leave of a B-spline, squared, below which rounding decides.
+SINGULAR = 1e-12
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
 SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 
 
-def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array, Array]:
+def smoothed(
+    time: Array, values: Array, *, motion: bool = False, step: float | None = None
+) -> tuple[Array, Array]:
     """Knots (k + 1,) and cubic coefficients (4, k) of the spline that predicts left-out samples best.
 
     Generalised cross-validation (Craven and Wahba 1979, Numerische Mathematik 31:377) of uniform
@@ -37,10 +41,11 @@ def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array
         time: shape (n,), s, strictly increasing.
         values: shape (n,).
         motion: the values are an angle, whose acceleration may jump where friction changes its sign.
+        step: q of the sensor; found in the values when None.
     """
     from scipy.interpolate import CubicSpline, PPoly
 
-    best, chosen = best_spline(time, values)
+    best, chosen = best_spline(time, values, step)
     if chosen is None:
         exact = CubicSpline(time, values)
         return np.asarray(exact.x), np.asarray(exact.c[::-1])
@@ -54,26 +59,51 @@ def smoothed(time: Array, values: Array, *, motion: bool = False) -> tuple[Array
     return breaks, np.asarray(pieces_of.c[::-1][:, keep])
 
 
-def best_spline(time: Array, values: Array) -> tuple[float, BSpline | None]:
-    """The least-squares spline that ``smoothed`` takes, with its score; None where none can be made."""
-    from scipy.interpolate import make_lsq_spline
+def least_squares_spline(time: Array, values: Array, knots: Array) -> BSpline:
+    """The cubic spline of least squares, in a time that is linear in the samples.
 
+    The normal equations of B-splines are banded and well conditioned (de Boor, A Practical Guide to Splines,
+    ch. XIV); SciPy's ``make_lsq_spline`` takes a time that grows with samples times knots.
+
+    Args:
+        time: shape (n,), strictly increasing.
+        values: shape (n,).
+        knots: shape (c + 4,), increasing, four equal ones at either end.
+
+    Raises:
+        LinAlgError: a stretch between knots has no samples.
+        ValueError: a sample lies outside of the knots.
+    """
+    from scipy.interpolate import BSpline
+    from scipy.linalg import cho_solve_banded, cholesky_banded
+
+    c = len(knots) - 4
+    design = BSpline.design_matrix(time, knots, 3)
+    parts, at = design.data.reshape(-1, 4), design.indices.reshape(-1, 4)
+    band, right = np.zeros((4, c)), np.zeros(c)
+    for i in range(4):
+        right += np.bincount(at[:, i], parts[:, i] * values, c)
+        for below in range(4 - i):
+            band[below] += np.bincount(at[:, i], parts[:, i] * parts[:, i + below], c)
+    factor = cholesky_banded(band, lower=True)
+    if np.any(factor[0] ** 2 <= SINGULAR * band[0]):
+        raise np.linalg.LinAlgError("a stretch between knots has no samples")
+    return BSpline(knots, cho_solve_banded((factor, True), right), 3)
+
+
+def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[float, BSpline | None]:
+    """The least-squares spline that ``smoothed`` takes, with its score; None where none can be made."""
     n = len(time)
-    allowed = STEPS_ALLOW * quantisation_step(values) / np.sqrt(12.0)
+    allowed = STEPS_ALLOW * (quantisation_step(values) if step is None else step) / np.sqrt(12.0)
     best, chosen = np.inf, None
     coarse: tuple[float, BSpline] | None = None
     rises = 0
     for spacing in SPACINGS:
-        pieces = int((n - 1) / spacing)
-        if pieces < 4:
+        if int((n - 1) / spacing) < 4:
             break
-        # Uniform in samples, so that a gap in the clock leaves no piece without any.
-        inner = np.interp(np.linspace(0, n - 1, pieces + 1)[1:-1], np.arange(n), time)
-        knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
-        try:
-            spline = make_lsq_spline(time, values, knots, k=3)
-        except (ValueError, np.linalg.LinAlgError):
-            continue  # a gap leaves a stretch between knots without samples
+        spline = _uniform(time, values, spacing)
+        if spline is None:
+            continue
         rest = float(np.mean((values - spline(time)) ** 2))
         score = rest / (1.0 - len(spline.c) / n) ** 2
         if rest <= allowed**2:
@@ -89,6 +119,17 @@ def best_spline(time: Array, values: Array) -> tuple[float, BSpline | None]:
     return best, chosen
 
 
+def _uniform(time: Array, values: Array, spacing: float) -> BSpline | None:
+    """The least-squares spline with knots every so many samples; None where there is none."""
+    n = len(time)
+    # Uniform in samples, so that a gap in the clock leaves no piece without any.
+    inner = np.interp(np.linspace(0, n - 1, int((n - 1) / spacing) + 1)[1:-1], np.arange(n), time)
+    try:
+        return least_squares_spline(time, values, np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4]))
+    except (ValueError, np.linalg.LinAlgError):
+        return None  # a gap leaves a stretch between knots without samples
+
+
 def _score(time: Array, values: Array, spline: BSpline) -> float:
     """Generalised cross-validation's mean square of what is left."""
     n = len(time)
@@ -100,7 +141,7 @@ def _jumping(time: Array, values: Array, spline: BSpline) -> BSpline | None:
 
     None where there is no reversal with room for one.
     """
-    from scipy.interpolate import PPoly, make_lsq_spline
+    from scipy.interpolate import PPoly
 
     knots = spline.t[4:-4]
     if len(knots) < 4:
@@ -118,7 +159,7 @@ def _jumping(time: Array, values: Array, spline: BSpline) -> BSpline | None:
     nearest = np.minimum(np.abs(knots - at[following]), np.abs(knots - at[np.maximum(following - 1, 0)]))
     inner = np.sort(np.concatenate([knots[nearest > 0.5 * spacing], at, at]))
     try:
-        return make_lsq_spline(time, values, np.concatenate([spline.t[:4], inner, spline.t[-4:]]), k=3)
+        return least_squares_spline(time, values, np.concatenate([spline.t[:4], inner, spline.t[-4:]]))
     except (ValueError, np.linalg.LinAlgError):
         return None  # a gap leaves a stretch between knots without samples
 
@@ -172,6 +213,4 @@ class SlowPart:
 
     def of(self, values: Array) -> Array:
         """The slow part of values of shape (n,)."""
-        from scipy.interpolate import make_lsq_spline
-
-        return np.asarray(make_lsq_spline(self.time, values, self._knots, k=3)(self.time))
+        return np.asarray(least_squares_spline(self.time, values, self._knots)(self.time))

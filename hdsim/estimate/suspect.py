@@ -63,7 +63,7 @@ def delays(bench: Bench, intervals: Sequence[Interval]) -> list[Problem]:
         bench: the measured series.
         intervals: fitted numbers, those of the delays among them.
     """
-    record = bench.predictors[0].record
+    record = bench.predictors[0].record.as_read
     found = []
     for one in intervals:
         if not one.delay_of or one.low <= 0.0 <= one.high or abs(one.value) < LATE * record.period_s:

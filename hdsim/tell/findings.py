@@ -29,12 +29,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """One measured record: its name, length (s), time between samples (s), whether it is held out."""
+    """One measured record: its name, length (s), time between readings (s), whether it is held out.
+
+    ``readings``: successive ones whose mean was compared.
+    """
 
     name: str
     duration_s: float
     period_s: float
     held: bool
+    readings: int = 1
 
 
 @dataclass(frozen=True)
@@ -231,7 +235,13 @@ def gather(diagnosis: Diagnosis) -> Findings:
         verdict=verdict,
         evidence=diagnosis.evidence,
         runs=tuple(
-            Run(p.record.name, p.record.duration_s, p.record.period_s, held=k >= bench.training)
+            Run(
+                p.record.name,
+                p.record.duration_s,
+                p.record.as_read.period_s,
+                held=k >= bench.training,
+                readings=p.record.readings,
+            )
             for k, p in enumerate(bench.predictors)
         ),
         series=tuple(series),

@@ -128,7 +128,8 @@ def _over_time(pictures: dict[str, str]) -> str:
 
 def _origin(found: Findings) -> str:
     names = [
-        f"{run.name} ({short(run.duration_s)} s at {short(1 / run.period_s, 4)} Hz{', held out' * run.held})"
+        f"{run.name} ({short(run.duration_s)} s at {short(1 / run.period_s, 4)} Hz"
+        f"{f', means of {run.readings} readings' * (run.readings > 1)}{', held out' * run.held})"
         for run in found.runs
     ]
     channels = ", ".join(map(spoken, found.channels))

@@ -121,7 +121,7 @@ def stated(line: Line) -> float | None:
     return float(verdict["effects"][0]["confidence"]) if verdict.get("effects") else None
 
 
-def closed(case: Case, gap: dict[str, Any]) -> float | None:
+def closed(case: Case, gap: dict[str, Any], readings: int = 1) -> float | None:
     """Share of the held-out gap after the re-fit that was closed, of what noise leaves to close.
 
     Of the channel whose gap over its best possible is largest. The best possible is what the held-out log
@@ -131,10 +131,11 @@ def closed(case: Case, gap: dict[str, Any]) -> float | None:
     Args:
         case: the case.
         gap: the verdict's, by channel.
+        readings: of the means that were compared.
     """
     best: tuple[float, float] | None = None
     for channel, own in gap.items():
-        floor = _floor(case, channel) or own["noise"]
+        floor = _floor(case, channel, readings) or own["noise"]
         if not floor or own["refit"] < CLOSABLE * floor:
             continue
         excess = own["refit"] / floor
@@ -143,9 +144,12 @@ def closed(case: Case, gap: dict[str, Any]) -> float | None:
     return None if best is None else round(best[1], 4)
 
 
-def _floor(case: Case, channel: str) -> float | None:
+def _floor(case: Case, channel: str, readings: int) -> float | None:
+    def means(values: Any) -> Any:
+        return values[: len(values) // readings * readings].reshape(-1, readings).mean(axis=1)
+
     squares = [
-        float(np.nanvar(record.channels[channel] - record.ideal[channel]))
+        float(np.nanvar(means(record.channels[channel] - record.ideal[channel])))
         for record in (case.holdout or case.records)
         if channel in record.ideal and channel in record.channels
     ]

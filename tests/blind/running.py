@@ -169,7 +169,7 @@ def _diagnosed(case: Case) -> Line:
     found |= {
         "verdict": verdict,
         "seconds": verdict["seconds"],
-        "closed": closed(case, verdict["gap"]),
+        "closed": closed(case, verdict["gap"], verdict["readings"]),
         "numbers": covered(case, verdict),
         "expected": case.numbers,
     }

@@ -65,7 +65,7 @@ def test_with_both_encoders_the_jitter_of_the_clock_falls_out():
     record = both_encoders(3e-4)
     alone = noise_floor(record.channels["output_angle"], np.ones(4000, dtype=bool))
     predictor = Predictor(record, plan_for(record), 100.0)
-    measured, _, noise = predictor.measured("output_angle")
+    measured, _, noise, _ = predictor.measured("output_angle")
     assert alone > 5e-5
     assert noise < 0.2 * alone
     # What is compared is the transmission error beside the smooth motion: order 2 at 1.2e-5 rad is seen.
@@ -77,7 +77,7 @@ def test_with_both_encoders_the_jitter_of_the_clock_falls_out():
 def test_without_jitter_the_output_is_compared_as_it_reads():
     record = both_encoders(0.0)
     record.channels["motor_angle"] = np.round(record.channels["motor_angle"] / 0.05) * 0.05
-    measured, _, _ = Predictor(record, plan_for(record), 100.0).measured("output_angle")
+    measured, _, _, _ = Predictor(record, plan_for(record), 100.0).measured("output_angle")
     assert measured is record.channels["output_angle"]
 
 
@@ -99,7 +99,7 @@ def test_a_real_joint_with_two_encoders_is_compared_by_its_transmission_error():
               for side in ("motor", "output")}  # fmt: skip
     record = Record("joint 3", log["Timestamp"] - log["Timestamp"][0], angles)
     alone = noise_floor(angles["output_angle"], np.ones(len(log), dtype=bool))
-    _, _, noise = Predictor(record, plan_for(record), 101.0).measured("output_angle")
+    _, _, noise, _ = Predictor(record, plan_for(record), 101.0).measured("output_angle")
     arcsec = np.degrees(1.0) * 3600.0
     assert alone * arcsec == pytest.approx(32.0, rel=0.1)
     assert noise * arcsec < 5.5
