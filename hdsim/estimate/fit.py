@@ -110,8 +110,10 @@ def fit(
             # What the data do not say is what was given: the others make up for it.
             change = columns[:, split.dropped] @ back
             moves = _standing_in(known[0], whole.priors[kept], change)
-            names = [free.name for free in chosen]
-            theta = dict(theta or {}) | dict(zip(names, moves[: len(chosen)].tolist(), strict=True))
+            begin = dict(theta or {})
+            for free, move in zip(chosen, moves, strict=False):
+                begin[free.name] = begin.get(free.name, 0.0) + float(move)
+            theta = begin
             state = scaled(state, dropped, back.tolist())
             dropped = [free.moved(free.none) for free in dropped]
             power = math.nan
