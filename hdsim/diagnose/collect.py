@@ -89,9 +89,6 @@ def _stage(stage: Stage) -> StageEvidence:
 
 def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
     first, last = (_own(added, stage.location) for stage in (stages[0], stages[-1]))
-    # The stage that named it, or another that it has taken the place of.
-    began = next((s for s in stages if s.named is one), stages[0])
-    own = _own(added, began.location)
     return LawEvidence(
         name=one.name,
         group=list(one.group),
@@ -100,7 +97,6 @@ def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
         gain=one.gain,
         # Sharp lines are no part of what smooth effects have left.
         of_left=max(one.of_left, one.of_lines) if added.lives_in[0] == SHARP else one.of_left,
-        of_own=float(np.clip(1.0 - last / own, 0.0, 1.0)) if own > 0 else 0.0,
         beyond=one.beyond,
         own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
         own_first=_own_first(added, stages[-1].location),

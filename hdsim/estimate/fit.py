@@ -65,6 +65,7 @@ def fit(
     held_effects: int = 0,
     evaluations: int = EVALUATIONS,
     prune: bool = True,
+    sure: int = 0,
     theta: Mapping[str, float] | None = None,
     after: Fit | None = None,
     known: tuple[Array, float] | None = None,
@@ -79,6 +80,7 @@ def fit(
         held_effects: that many of the first added effects stay as they are.
         evaluations: residuals that the optimiser may ask for.
         prune: leave numbers that the data do not determine where they are.
+        sure: that many of the last numbers of the base are fitted in any case.
         theta: where the logarithms of the base's factors start, by name; 0 by default.
         after: an earlier fit whose undetermined numbers stay so, and widen the intervals of this one's.
         known: sensitivities near the start to the first numbers, shape (rows, up to p), and what one
@@ -96,18 +98,19 @@ def fit(
     if prune and chosen:
         whole = Measured(bench, Vector(state, tuple(chosen), held_effects), theta)
         columns = whole.sensitivities(whole.start)
-        split = determined(columns, whole.residual(whole.start), whole.priors, whole.blocks, len(chosen))
+        asked = len(chosen) - sure
+        split = determined(columns, whole.residual(whole.start), whole.priors, whole.blocks, asked)
         dropped = [chosen[k] for k in split.dropped]
         ties |= {chosen[k].name: [chosen[j].name for j in tied] for k, tied in split.ties.items()}
-        others = list(range(len(chosen), columns.shape[1]))
-        known, power = (columns[:, split.kept + others], split.power), split.power
-        chosen = [chosen[k] for k in split.kept]
+        kept = [*split.kept, *range(asked, columns.shape[1])]
+        known, power = (columns[:, kept], split.power), split.power
+        chosen = [chosen[k] for k in kept if k < len(chosen)]
         begins = dict(theta or {})
         back = [free.none - begins.get(free.name, 0.0) for free in dropped]
         if any(back):
             # What the data do not say is what was given: the others make up for it.
             change = columns[:, split.dropped] @ np.array(back)
-            moves = _standing_in(known[0], whole.priors[split.kept + others], change)
+            moves = _standing_in(known[0], whole.priors[kept], change)
             for free, move in zip(chosen, moves[: len(chosen)].tolist(), strict=True):
                 begins[free.name] = begins.get(free.name, 0.0) + move
             theta = begins

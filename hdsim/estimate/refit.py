@@ -96,13 +96,14 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     # still hold much of it leaves what the next one finds.
     reweigh(bench, found)
     for weighing in range(WEIGHINGS):
-        theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
+        frees = at_present(found)
         if weighing == 0 and found.undetermined:
             # Far from the end, what the data see may look different from there.
-            found = fit(bench, state, [*found.frees, *found.undetermined], theta=theta)
+            # What was driven to nearly nothing has no slope there; that is no reason to call it unknown.
+            found = fit(bench, found.state, [*found.undetermined, *frees], sure=len(frees))
         else:
             known = found.columns, math.nan
-            found = fit(bench, state, found.frees, theta=theta, prune=False, known=known, after=found)
+            found = fit(bench, found.state, frees, prune=False, known=known, after=found)
         align(bench, found)
         if reweigh(bench, found) < ALIKE:
             break
