@@ -105,16 +105,16 @@ def fit(
         kept = [*split.kept, *range(asked, columns.shape[1])]
         known, power = (columns[:, kept], split.power), split.power
         chosen = [chosen[k] for k in kept if k < len(chosen)]
-        back = np.array([free.none for free in dropped])
-        if np.any(back):
+        begins = dict(theta or {})
+        back = [free.none - begins.get(free.name, 0.0) for free in dropped]
+        if any(back):
             # What the data do not say is what was given: the others make up for it.
-            change = columns[:, split.dropped] @ back
+            change = columns[:, split.dropped] @ np.array(back)
             moves = _standing_in(known[0], whole.priors[kept], change)
-            begin = dict(theta or {})
-            for free, move in zip(chosen, moves, strict=False):
-                begin[free.name] = begin.get(free.name, 0.0) + float(move)
-            theta = begin
-            state = scaled(state, dropped, back.tolist())
+            for free, move in zip(chosen, moves[: len(chosen)].tolist(), strict=True):
+                begins[free.name] = begins.get(free.name, 0.0) + move
+            theta = begins
+            state = scaled(state, dropped, [free.none for free in dropped])
             dropped = [free.moved(free.none) for free in dropped]
             power = math.nan
         undetermined += dropped
