@@ -195,7 +195,8 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
         begins.append((np.ones(1), np.clip(np.where(stiff, beyond, moves), -FARTHEST, FARTHEST)))
     held = len(base.state.added)
     found: list[Fit] = []
-    for start, move in begins:
+
+    def begin(start: Array, move: Array) -> None:
         state = replace(base.state, added=(*base.state.added, replace(added, coefficients=tuple(start))))
         theta = {free.name: float(t) for free, t in zip(frees, point.theta + move, strict=True)}
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
@@ -203,6 +204,13 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
                 fit(bench, state, frees, held_effects=held, prune=False, evaluations=ROUGH, theta=theta,
                     after=base, known=(np.hstack([point.columns, columns]), power), rough=True)
             )  # fmt: skip
+
+    for start, move in begins:
+        begin(start, move)
+    before = bench.power(base.predictions)
+    if not series and all(bench.power(each.predictions) > before for each in found):
+        # A step so long that it leads astray: where numbers almost stand in for one another.
+        begin(SMALL * coefficients, SMALL * moves)
     return found
 
 

@@ -32,6 +32,8 @@ MOST_EFFECTS, MOST_STAGES = 4, 7
 #: coordinates of the effects before it does (a sharp line in an order spectrum is that small), and where one
 #: would, because no formula is exact.
 BEYOND_GAIN, WITHIN_GAIN = 0.005, 0.1
+#: Part of what is left that makes it the next effect's, even in the coordinates of those that are there.
+MOST = 0.5
 #: Part of what is left by which it must have fallen for the last name to be asked again.
 NEWS = 0.1
 
@@ -114,11 +116,13 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     if found.named and not (stage.location.sharp(LEVEL) or _more_could(bench, base, current)):
         return None
-    for beyond in (True, False) if found.named else (False,):
-        named = _one_more(bench, base, current, found, stage, beyond, during)
-        if named is not None:
-            break
-    else:
+    named = _one_more(bench, base, current, found, stage, bool(found.named), during)
+    if found.named and (named is None or named.of_left < MOST):
+        within = _one_more(bench, base, current, found, stage, False, during)
+        # No formula errs by so much that another explains most of it.
+        if within is not None and (named is None or within.of_left > max(MOST, named.of_left)):
+            named = within
+    if named is None:
         return None
     stage.named = named
     found.named.append(named)

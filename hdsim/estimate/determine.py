@@ -36,7 +36,12 @@ class Determined:
 
 
 def determined(
-    columns: Array, rest: Array, priors: Array, blocks: NDArray[np.int64], candidates: int
+    columns: Array,
+    rest: Array,
+    priors: Array,
+    blocks: NDArray[np.int64],
+    candidates: int,
+    named: int | None = None,
 ) -> Determined:
     """Split numbers into those that the data determine and the others.
 
@@ -49,6 +54,7 @@ def determined(
         priors: prior standard deviations, shape (p,), finite.
         blocks: shape (rows,).
         candidates: that many of the first numbers may be dropped.
+        named: that many of the first may be what a dropped one is tied to; the candidates by default.
     """
     # What one step of the fit takes away is no noise, however far off the start is.
     step, *_ = np.linalg.lstsq(columns * priors, rest, rcond=1e-6)
@@ -68,8 +74,11 @@ def determined(
             break
         weakest = directions[-1]
         tied = np.linalg.norm(scaled[:, worst]) > SEEN
+        last = candidates if named is None else named
         ties[kept[worst]] = [
-            kept[k] for k in range(len(kept)) if k != worst and tied and abs(weakest[k]) > SHARE
+            use[k]
+            for k in range(len(use))
+            if k != worst and use[k] < last and tied and abs(weakest[k]) > SHARE
         ]
         dropped.append(kept.pop(worst))
     return Determined(kept, dropped, ties, power)

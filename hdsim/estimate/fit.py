@@ -99,7 +99,8 @@ def fit(
         whole = Measured(bench, Vector(state, tuple(chosen), held_effects), theta)
         columns = whole.sensitivities(whole.start)
         asked = len(chosen) - sure
-        split = determined(columns, whole.residual(whole.start), whole.priors, whole.blocks, asked)
+        rest = whole.residual(whole.start)
+        split = determined(columns, rest, whole.priors, whole.blocks, asked, len(chosen))
         dropped = [chosen[k] for k in split.dropped]
         ties |= {chosen[k].name: [chosen[j].name for j in tied] for k, tied in split.ties.items()}
         kept = [*split.kept, *range(asked, columns.shape[1])]

@@ -56,8 +56,9 @@ def test_a_plant_without_an_effect_is_the_base_model(k, algebraic, compared):
     rest = compared(setup, {})
     # Where friction changes sign by another formula than the model's, that hides in the noise.
     assert rest.pop("motor_torque") < (0.3 if setup.algebraic_sign else 0.15)
-    # Where a locked drive is unwound is estimated from its log, which shifts its torque a little.
-    assert max(rest.values()) < (0.4 if setup.locked else 0.03)
+    # Where a locked drive is unwound, and where the output's encoder has its zero beside the motor's, is
+    # estimated from the log, which shifts a torque, or the angle of a weight, a little.
+    assert max(rest.values()) < (0.4 if setup.locked else 0.05)
 
 
 @pytest.mark.parametrize("sensors", SENSORS)

