@@ -142,13 +142,6 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
         found.append(
             ("part of what was left that it explains", law.of_left, rules.of_left * _log_odds(law.of_left))
         )
-        found.append(
-            (
-                "what it explains beyond smooth curves over the others' coordinates",
-                law.beyond,
-                rules.beyond * _log_odds(law.beyond),
-            )
-        )
     return found
 
 

@@ -75,8 +75,6 @@ class LawEvidence(Part):
     """Part of the first pass's structure that it explained when it was added."""
     of_left: float = 1.0
     """Part of what was left beyond the noise when it was added that its fit explained."""
-    beyond: float = 1.0
-    """Part of what its trace explains that no smooth curve over the others' coordinates can."""
     own_left: float = 0.0
     """Structure left in its own coordinate, as a part of what was there at first."""
     own_first: bool = True

@@ -64,7 +64,6 @@ class Named:
         of_left: part of what was left beyond the noise that its fit explained; likewise.
         of_lines: part of the sharp lines that were left that it explained, where it lives there; likewise.
         gain: part of the first pass's structure that it explained; set by the search.
-        beyond: part of its trace's share that curves over the others' coordinates leave it; likewise.
     """
 
     name: str
@@ -77,7 +76,6 @@ class Named:
     alternatives: dict[str, Fit]
     candidates: list[CandidateEvidence]
     gain: float = 1.0
-    beyond: float = 1.0
     of_left: float = 1.0
     of_lines: float = 0.0
 

@@ -181,9 +181,6 @@ def _one_more(
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell)
     if named is None:
         return None
-    alone = next(one for one in screening.ranked if one.name == named.name)
-    own = found.left.share(alone.columns).share * found.left.power
-    named.beyond = float(np.clip(alone.share.share * left.power / own, 0.0, 1.0)) if own > 0 else 0.0
     named.gain = _gain(bench, base, current, named.fit)
     named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
     sharp = named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL)
@@ -308,8 +305,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
             before = found.named[k]
-            own.gain, own.beyond = before.gain, before.beyond
-            own.of_left, own.of_lines = before.of_left, before.of_lines
+            own.gain, own.of_left, own.of_lines = before.gain, before.of_left, before.of_lines
             found.named[k] = own
         k += 1
     return current
@@ -318,7 +314,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
 def _inherit(one: Named, other: Named) -> None:
     """A name that takes another's place explains at least what that did."""
     one.gain = max(one.gain, other.gain)
-    one.beyond, one.of_left = max(one.beyond, other.beyond), max(one.of_left, other.of_left)
+    one.of_left = max(one.of_left, other.of_left)
 
 
 def _clear(one: Named, newest: Named) -> bool:

@@ -48,9 +48,6 @@ WORDINGS = {
     "part of what was left that it explains": Wording(
         "part of what the effects before it left that it explains", _part
     ),
-    "what it explains beyond smooth curves over the others' coordinates": Wording(
-        "part of it that no smooth curve of the other effects can stand in for", _part
-    ),
     "structure is left by chance": Wording(
         "chance that pure noise shows as much of a pattern as is left", below, "at most"
     ),

@@ -28,7 +28,6 @@ WEIGHTS = (
     "own_left_exact",
     "limit",
     "later",
-    "beyond",
     "of_left",
 )
 SPREAD = 0.5
