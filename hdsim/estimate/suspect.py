@@ -137,7 +137,7 @@ def _numbers(bench: Bench, base: Refit, after: list[Array], scales: list[Problem
         if series.channel != "output_angle" and rests[1] > MISSED * varies:
             worse.append(f"{series.channel} is missed by {rests[1] / varies:.2g} times its own variation")
     far = []
-    for free, away in zip(base.fit.frees, base.fit.theta, strict=True):
+    for k, (free, away) in enumerate(zip(base.fit.frees, base.fit.theta, strict=True)):
         theta = float(away) - free.given  # from the model's own number, wherever the fit began
         if free.delay_of:
             continue  # a delay has no scale to be far from
@@ -145,7 +145,9 @@ def _numbers(bench: Bench, base: Refit, after: list[Array], scales: list[Problem
         # A number that closes no gap has only been bent by something that is missing; friction and
         # damping may be nothing.
         least = math.inf if free.may_vanish else limit
-        if closed and not -least <= theta <= limit:
+        # What its interval still reaches, the data do not contradict.
+        wide = 2.0 * math.sqrt(base.fit.covariance[k, k])
+        if closed and not -least - wide <= theta <= limit + wide:
             bound = ", the bound of the search" if abs(theta) > 2.99 else ""
             far.append(f"{free.name} is {math.exp(theta):.3g} times the model's{bound}")
     if not far and not worse:
