@@ -147,14 +147,14 @@ def test_a_number_that_later_fits_bring_back_is_no_longer_suspected(tmp_path):
     assert suspicions(bench, base, start) == []
     k = [free.name for free in base.fit.frees].index("drive.friction.coulomb_nm")
     bent = base.fit.theta.copy()
-    bent[k] = base.fit.frees[k].given + np.log(20.0)
+    bent[k] = base.fit.frees[k].given + np.log(100.0)
     (found,) = suspicions(bench, replace(base, fit=replace(base.fit, theta=bent)), start)
-    assert "drive.friction.coulomb_nm is 20 times" in found.message
-    # A later fit begins where the re-fit ended: its own factor of 1 is still 20 times the model's number.
+    assert "drive.friction.coulomb_nm is 100 times" in found.message
+    # A later fit begins where the re-fit ended: its own factor of 1 is still 100 times the model's number.
     frees = list(base.fit.frees)
     frees[k] = frees[k].moved(bent[k])
     bent[k] = 0.0
     (again,) = suspicions(bench, replace(base, fit=replace(base.fit, frees=frees, theta=bent)), start)
-    assert "drive.friction.coulomb_nm is 20 times" in again.message
-    bent[k] = -np.log(20.0)
+    assert "drive.friction.coulomb_nm is 100 times" in again.message
+    bent[k] = -np.log(100.0)
     assert suspicions(bench, replace(base, fit=replace(base.fit, frees=frees, theta=bent)), start) == []
