@@ -8,7 +8,7 @@ import pytest
 from drives import LEAST_FACTOR, MOST_FACTOR
 from hidden import EFFECTS, KINDS_OF
 from outside import OUTSIDE
-from running import base_of, task_of
+from running import Task, base_of, drawn, keep, task_of
 from sensing import SENSORS
 
 from hdsim.effects import catalogue
@@ -121,3 +121,16 @@ def test_drives_stay_within_their_factors():
     assert low.coulomb == pytest.approx(LEAST_FACTOR * DRIVES[0].coulomb)
     assert high.stiffness[2] == pytest.approx(MOST_FACTOR * DRIVES[0].stiffness[2])
     assert Path(__file__).with_name("contract.py").exists()
+
+
+def test_a_kept_case_is_the_drawn_one_and_not_drawn_again(tmp_path, monkeypatch):
+    task = Task("numpy", 7, 0, cases=tmp_path)
+    key = keep(task)["key"]
+    monkeypatch.setattr(family, "draw", None)
+    again = drawn(task)
+    assert again.key == key
+    monkeypatch.undo()
+    fresh = drawn(Task("numpy", 7, 0))
+    assert again.base == fresh.base
+    for one, other in zip(again.records, fresh.records, strict=True):
+        assert all(np.array_equal(one.channels[c], other.channels[c]) for c in other.channels)
