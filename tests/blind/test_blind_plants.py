@@ -186,4 +186,5 @@ def test_the_numbers_to_recover_are_those_of_the_plant(hidden, compared):
     trace = strength(setup, changes)
     rest = compared(setup, changes, {name: effect})
     assert trace.plain > 0.1
-    assert max(rest.values()) < max(0.05 * trace.plain, 0.1), (rest, trace)
+    # A play turns the zero between the encoders, which is estimated from the log, by a tenth of the noise.
+    assert max(rest.values()) < max(0.05 * trace.plain, 0.12), (rest, trace)
