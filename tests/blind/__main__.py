@@ -111,7 +111,9 @@ def page(given: argparse.Namespace) -> None:
     lines = lines_of(given.results)
     given.write.parent.mkdir(parents=True, exist_ok=True)
     given.write.write_text(pages.page(lines), encoding="utf-8")
-    pages.reliability_picture(lines, given.write.parent / "images" / "reliability.png")
+    pages.reliability_picture(
+        [r for r in lines if pages.states(r)], given.write.parent / "images" / "reliability.png"
+    )
     print(f"{len(lines)} cases: {given.write}")
 
 
