@@ -36,7 +36,7 @@ REACHED = 1.05
 FARTHEST = 2.0
 #: Part of the drive's compliance that the screen may give to an effect in series.
 SOFTEST = 0.85
-#: Part of the screen's coefficient at which a compliance's fit begins a second time.
+#: Part of the screen's coefficient at which a compliance's fit, or one that led astray, begins a second time.
 SMALL = 0.2
 
 
