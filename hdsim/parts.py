@@ -143,8 +143,13 @@ class Builder(Protocol):
     def twist(self, kernel: Kernel, parameters: Sequence[float] | Array) -> None:
         """Add a contribution to the mesh twist (kinematic error and its kin)."""
 
-    def series_compliance(self, wind_up: Callable[[Array], Array]) -> None:
-        """Put a spring in series with the torsion spring: odd wind-up (rad, at output) over torque (N m)."""
+    def series_compliance(self, wind_up: Callable[[Array], Array], *, play: bool = False) -> None:
+        """Put a spring in series with the torsion spring: odd wind-up (rad, at output) over torque (N m).
+
+        Args:
+            wind_up: the spring.
+            play: whether it is free play taken up gradually: what is not in contact is not damped.
+        """
 
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh, as an angle at the output."""

@@ -36,6 +36,7 @@ class Contributions:
     external: dict[str, int] = field(default_factory=dict)
     housing: tuple[int, float] | None = None
     half_gap_rad: float = 0.0
+    play: bool = False
 
 
 class Contributed:
@@ -85,13 +86,15 @@ class Contributed:
         """Add a contribution to the mesh twist."""
         self._given.twists.append((kernel, np.asarray(parameters, dtype=np.float64)))
 
-    def series_compliance(self, wind_up: Callable[[Array], Array]) -> None:
+    def series_compliance(self, wind_up: Callable[[Array], Array], *, play: bool = False) -> None:
         """Put a spring in series with the torsion spring."""
         self._given.wind_ups.append(wind_up)
+        self._given.play |= play
 
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh (rad at the output)."""
         self._given.half_gap_rad += half_gap_rad
+        self._given.play |= half_gap_rad > 0
 
     def signal(self, signal: Any) -> int:
         """Register a signal; returns the column of its value."""

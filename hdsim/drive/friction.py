@@ -54,6 +54,29 @@ def torsion_damping(inputs, parameters, own, columns, outputs, jacobian):  # typ
 
 
 @element
+def contact_damping(inputs, parameters, own, columns, outputs, jacobian):  # type: ignore[no-untyped-def]
+    """Viscous damper parallel to the torsion spring of a drive with play; parameter: N m s/rad.
+
+    P = -c chi' within +-|tau|: what is not in contact is not damped, and spring and damper together never
+    pull what only touches (the limit of Modelica's ``ElastoBacklash``).
+    """
+    rate = inputs[TWIST_RATE]
+    tau = inputs[TRANSMITTED_TORQUE]
+    torque = parameters[0] * rate
+    by_rate, by_tau = parameters[0], 0.0
+    if abs(torque) > abs(tau):
+        by_rate = 0.0
+        by_tau = math.copysign(1.0, torque) * math.copysign(1.0, tau)
+        torque = math.copysign(abs(tau), torque)
+    outputs[TWIST_TORQUE] -= torque
+    outputs[DISSIPATED] += torque * rate
+    jacobian[TWIST_TORQUE * columns + TWIST_RATE] -= by_rate
+    jacobian[TWIST_TORQUE * columns + TRANSMITTED_TORQUE] -= by_tau
+    jacobian[DISSIPATED * columns + TWIST_RATE] += by_rate * rate + torque
+    jacobian[DISSIPATED * columns + TRANSMITTED_TORQUE] += by_tau * rate
+
+
+@element
 def mesh_damping(inputs, parameters, own, columns, outputs, jacobian):  # type: ignore[no-untyped-def]
     """Viscous damper parallel to the mesh; parameter: N m s/rad."""
     rate = inputs[MESH_TWIST_RATE]

@@ -71,12 +71,14 @@ class Model(Contributed):
         self.teeth: Teeth | None = None
         # The signals' columns follow the own states, whose number is known only after a first pass; so is the
         # friction of all parts.
+        self._has_play = False
         for _ in range(2):
             self._given = Contributions()
             self.motion_columns = {name: self.signal(motion) for name, motion in self.motions.items()}
             self._contribute_drive()
             for part in self.parts:
                 part.contribute(self)
+            self._has_play = self._given.play
             self._own_before = len(self._given.states)
             self._names = {state.name: OWN + k for k, state in enumerate(self._given.states)}
             self.input_frictions = tuple(self._given.input_frictions)
@@ -104,9 +106,12 @@ class Model(Contributed):
     def _contribute_drive(self) -> None:
         friction.contribute_friction(self, self.drive.friction)
         damping = self.drive.torsion.damping_nm_s_per_rad
-        if damping > 0 and not self.rigid:
-            self.element(friction.torsion_damping, [damping])
         mesh = self.drive.mesh
+        if damping > 0 and not self.rigid:
+            # A ring of its own has its own twist; else damper and play are in series, but share one twist.
+            free_play = isinstance(mesh, TeethMesh | TabulatedMesh) or self._has_play
+            kernel = friction.contact_damping if free_play and not self.has_ring else friction.torsion_damping
+            self.element(kernel, [damping])
         if isinstance(mesh, TeethMesh | TabulatedMesh) and mesh.damping_nm_s_per_rad > 0:
             self.element(friction.mesh_damping, [mesh.damping_nm_s_per_rad])
 

@@ -82,4 +82,4 @@ class OutputBacklash(Effect):
 
             return half * np.tanh(coefficient * torque)
 
-        build.series_compliance(wind_up)
+        build.series_compliance(wind_up, play=half > 0)
