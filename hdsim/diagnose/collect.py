@@ -96,7 +96,7 @@ def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
         sampled=one.confidence,
         gain=one.gain,
         # Sharp lines are no part of what smooth effects have left.
-        of_left=max(one.of_left, one.of_lines) if added.lives_in[0] == SHARP else one.of_left,
+        needed=max(one.needed, one.of_lines) if added.lives_in[0] == SHARP else one.needed,
         own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
         own_first=_own_first(added, stages[-1].location),
         exact=catalogue()[one.name].signature.exact,

@@ -140,7 +140,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     if k > 0:
         found.append(("one more effect", float(k), rules.later))
         found.append(
-            ("part of what was left that it explains", law.of_left, rules.of_left * _log_odds(law.of_left))
+            ("part of what would be missing without it", law.needed, rules.needed * _log_odds(law.needed))
         )
     return found
 

@@ -73,8 +73,9 @@ class LawEvidence(Part):
     """Share of resampled records, over blocks of time, in which it or its group is the best."""
     gain: float
     """Part of the first pass's structure that it explained when it was added."""
-    of_left: float = 1.0
-    """Part of what was left beyond the noise when it was added that its fit explained."""
+    needed: float = 1.0
+    """Part of what would be missing without it that it explains, all others fitted anew, in the channel where
+    that is most."""
     own_left: float = 0.0
     """Structure left in its own coordinate, as a part of what was there at first."""
     own_first: bool = True

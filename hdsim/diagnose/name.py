@@ -64,6 +64,7 @@ class Named:
         of_left: part of what was left beyond the noise that its fit explained; likewise.
         of_lines: part of the sharp lines that were left that it explained, where it lives there; likewise.
         gain: part of the first pass's structure that it explained; set by the search.
+        needed: part of what would be missing without it that it explains, beside all others; likewise.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Named:
     gain: float = 1.0
     of_left: float = 1.0
     of_lines: float = 0.0
+    needed: float = 1.0
 
 
 def name_effect(

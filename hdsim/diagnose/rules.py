@@ -51,8 +51,11 @@ class Rules(Part):
     )
     limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
     later: float = _rule(-1.4, "log odds", "for each effect beside the first", BY)
-    of_left: float = _rule(
-        1.0, "log odds per log odds", "weight of the part of what was left that a later one explains", BY
+    needed: float = _rule(
+        1.0,
+        "log odds per log odds",
+        "weight of the part of what would be missing without a later one that it explains",
+        BY,
     )
     believed: float = _rule(
         0.5, "probability", "least confidence of a name: more likely right than not", "a principle"

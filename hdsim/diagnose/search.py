@@ -16,6 +16,7 @@ import numpy as np
 from hdsim.diagnose.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnose.name import LEAST_SHARE, SAME, Named, name_effect
 from hdsim.diagnose.orders import Line, order_lines, power_of
+from hdsim.diagnose.revise import revised
 from hdsim.diagnose.screen import LEVEL, Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
@@ -80,21 +81,28 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
             continue
         late = with_delays(bench, found.fit, rough=True)
         if late is None:
-            return _settled(bench, found)
+            return _settled(bench, base, found, during)
         noise = sum(bench.noise_powers.values())
         left, now = (bench.power(each.predictions) - noise for each in (found.fit, late))
         found.fit = late
         if now > (1.0 - NEWS) * left or len(found.stages) == MOST_STAGES:
-            return _settled(bench, found)
+            return _settled(bench, base, found, during)
         # What a delay has blurred may show now.
         align(bench, found.fit)
         reweigh(bench, found.fit)
 
 
-def _settled(bench: Bench, found: Search) -> Search:
-    """The search's last fit carried on to its optimum, with the covariance there."""
+def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Search:
+    """The search's last fit carried on to its optimum, without needless names, with the covariance there."""
     found.fit = together(bench, found.fit)
     if found.named:
+        tell = during("again", "asking for each name beside the others")
+        count = len(found.named)
+        found.fit = revised(bench, found.fit, found.named, tell)
+        if 1 < len(found.named) < count:
+            # Beside a name that was needless others may have been wrong.
+            found.fit = together(bench, _again(bench, base, found.fit, found, tell, every=True))
+            found.fit = revised(bench, found.fit, found.named, tell)
         # What is left is what this fit leaves, not the rough one before it.
         found.left = left_of(bench, found.fit)
         last = found.stages[-1]
@@ -138,10 +146,6 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         current = _again(bench, base, together(bench, current, rough=True), found, tell)
         current = sharpened(bench, current)
         align(bench, current)
-        # With the others beside it a name explains more than where it was tried with them held.
-        noise = sum(bench.noise_powers.values())
-        was, now = (bench.power(each.predictions) - noise for each in (found.fit, current))
-        named.of_left = max(named.of_left, float(np.clip((was - now) / was, 0.0, 1.0)) if was > 0 else 0.0)
         reweigh(bench, current)
     return current
 
@@ -246,7 +250,7 @@ def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
     return any(last[c] - noise[c] >= BEYOND_GAIN * (first[c] - noise[c]) for c in first)
 
 
-def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> Fit:
+def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, every: bool = False) -> Fit:
     """Ask every name again; ``found.named`` is changed in place.
 
     The last one was asked beside the others, and is so again only where they have changed since, or where it
@@ -256,11 +260,11 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
     k = 0
     while k < len(found.named):
         stuck = current.state.added[k].at_limit
-        if not stuck and _clear(found.named[k], found.named[-1]):
+        if not (stuck or every) and _clear(found.named[k], found.named[-1]):
             k += 1
             continue
         settled = bench.power(current.predictions) > (1.0 - NEWS) * first
-        if k == len(found.named) - 1 and settled and not stuck:
+        if k == len(found.named) - 1 and settled and not (stuck or every):
             break
         own = found.named[k]
         added = list(current.state.added)
@@ -305,7 +309,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
             before = found.named[k]
-            own.gain, own.of_left, own.of_lines = before.gain, before.of_left, before.of_lines
+            own.gain, own.of_lines = before.gain, before.of_lines
             found.named[k] = own
         k += 1
     return current
@@ -314,7 +318,6 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step) -> 
 def _inherit(one: Named, other: Named) -> None:
     """A name that takes another's place explains at least what that did."""
     one.gain = max(one.gain, other.gain)
-    one.of_left = max(one.of_left, other.of_left)
 
 
 def _clear(one: Named, newest: Named) -> bool:

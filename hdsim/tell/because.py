@@ -45,8 +45,8 @@ WORDINGS = {
         "part of what lived in its own coordinate that it leaves there", _part
     ),
     "one more effect": Wording("not the first: a further effect", lambda k: f"no. {k + 1:.0f}"),
-    "part of what was left that it explains": Wording(
-        "part of what the effects before it left that it explains", _part
+    "part of what would be missing without it": Wording(
+        "part of what the other effects alone leave that it explains", _part
     ),
     "structure is left by chance": Wording(
         "chance that pure noise shows as much of a pattern as is left", below, "at most"

@@ -28,7 +28,7 @@ WEIGHTS = (
     "own_left_exact",
     "limit",
     "later",
-    "of_left",
+    "needed",
 )
 SPREAD = 0.5
 #: Those that can only speak against a name.

@@ -66,7 +66,7 @@ def test_what_is_left_beyond_the_noise_is_unknown():
 
 
 def test_a_second_name_that_explains_little_of_what_is_left_is_not_given():
-    decision = decide(found(law(), law("damaged_tooth", of_left=0.5)))
+    decision = decide(found(law(), law("damaged_tooth", needed=0.5)))
     assert decision.names == [0]
 
 
@@ -74,7 +74,7 @@ laws = st.builds(
     law,
     sampled=st.floats(0, 1),
     gain=st.floats(0, 1),
-    of_left=st.floats(0, 1),
+    needed=st.floats(0, 1),
     at_limit=st.booleans(),
 )
 evidence = st.builds(

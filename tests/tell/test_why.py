@@ -53,13 +53,13 @@ def test_every_reason_is_on_the_terminal(kind):
 
 
 def test_what_decide_asks_has_plain_words():
-    two = EFFECT.model_copy(update={"laws": [law(at_limit=True), law("unbalance", of_left=0.9)]})
+    two = EFFECT.model_copy(update={"laws": [law(at_limit=True), law("unbalance", needed=0.9)]})
     asked = [*decide(two).because, *decide(NOTHING).because, *decide(UNKNOWN).because]
     assert {reason.rule for reason in asked} - {LIKELY} == set(WORDINGS)
 
 
 def test_the_bars_add_up_to_the_probability():
-    evidence = EFFECT.model_copy(update={"laws": [law(), law("unbalance", of_left=0.8, sampled=0.8)]})
+    evidence = EFFECT.model_copy(update={"laws": [law(), law("unbalance", needed=0.8, sampled=0.8)]})
     decision = decide(evidence)
     found = weighings(decision.because)
     assert [one.name for one in found] == ["motor_torque_ripple", "unbalance"]
@@ -72,7 +72,7 @@ def test_the_bars_add_up_to_the_probability():
 
 
 def test_an_effect_that_was_found_twice_is_weighed_twice():
-    evidence = EFFECT.model_copy(update={"laws": [law(), law(sampled=0.1, of_left=0.2)]})
+    evidence = EFFECT.model_copy(update={"laws": [law(), law(sampled=0.1, needed=0.2)]})
     first, second = weighings(decide(evidence).because)
     assert first.name == second.name
     assert (len(first.weights), len(second.weights)) == (4, 6)
@@ -81,7 +81,7 @@ def test_an_effect_that_was_found_twice_is_weighed_twice():
 
 def test_what_is_not_believed_stands_beside_what_is(tmp_path):
     evidence = EFFECT.model_copy(
-        update={"laws": [law(), law("unbalance", sampled=0.05, of_left=0.1, at_limit=True)]}
+        update={"laws": [law(), law("unbalance", sampled=0.05, needed=0.1, at_limit=True)]}
     )
     found = told(evidence)
     assert [effect.name for effect in found.verdict.effects] == ["motor_torque_ripple"]

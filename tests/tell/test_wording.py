@@ -77,7 +77,7 @@ def test_nothing_is_very_sure_while_much_is_left(evidence, left):
 
 
 def test_what_only_an_effect_without_a_name_explains_is_left_too():
-    unsure = law("unbalance", gain=0.15, sampled=0.4, of_left=0.1, own_left=0.9)
+    unsure = law("unbalance", gain=0.15, sampled=0.4, needed=0.1, own_left=0.9)
     found = told(EFFECT.model_copy(update={"laws": [*EFFECT.laws, unsure], "explained": 0.99}))
     assert [effect.name for effect in found.verdict.effects] == ["motor_torque_ripple"]
     gap = GAP.model_copy(update={"after": 2.5 * GAP.noise})
@@ -116,7 +116,7 @@ def test_a_group_is_sure_as_a_group():
 
 
 def test_each_of_several_names_has_its_own_probability():
-    found = told(EFFECT.model_copy(update={"laws": [law(), law("unbalance", sampled=0.95, of_left=0.97)]}))
+    found = told(EFFECT.model_copy(update={"laws": [law(), law("unbalance", sampled=0.95, needed=0.97)]}))
     first, second, chance = sureness(found).details
     assert first == "Motor torque ripple: over 99 in 100 of such names are right."
     assert second.startswith("Unbalance: ")

@@ -1,0 +1,87 @@
+"""After the search: every name is asked for once more, with all the others beside it.
+
+Names are given one after the other, the first ones while other effects are still missing. Here the model
+without each is fitted anew: a name that leaves nothing which the others do not explain as well is taken back
+(backward elimination), and of the rest it is said what part of what would be missing they explain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hdsim.diagnose.name import Named
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.covariance import correlation
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.refit import together
+
+#: Least excess over a channel's noise power that counts: a fifth of the noise's root mean square.
+EXCESS = 0.05
+#: Part of what would be missing without it below which a name is taken back.
+NEEDLESS = 0.1
+
+
+def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str], object]) -> Fit:
+    """The model without needless names; ``needed`` of the others is set.
+
+    Args:
+        bench: the measured series.
+        current: the model with all of them.
+        named: in the order of ``current.state.added``; needless ones are taken out of it.
+        tell: told what is being done.
+    """
+    while len(named) > 1:
+        others: list[Fit | None] = []
+        for k, one in enumerate(named):
+            tell(f"without {one.name}")
+            others.append(_without(bench, current, k))
+            one.needed = needed(bench, others[-1], current) if others[-1] is not None else 1.0
+        k = min(range(len(named)), key=lambda k: named[k].needed)
+        without = others[k]
+        if without is None or named[k].needed >= NEEDLESS:
+            break
+        del named[k]
+        # What the others make up for it takes them a few more steps.
+        current = together(bench, without)
+    if len(named) == 1:
+        named[0].needed = 1.0
+    return current
+
+
+def _without(bench: Bench, current: Fit, k: int) -> Fit | None:
+    added = current.state.added
+    state = replace(current.state, added=(*added[:k], *added[k + 1 :]))
+    try:
+        return together(bench, current, state)
+    except (PredictionError, np.linalg.LinAlgError):
+        return None
+
+
+def needed(bench: Bench, without: Fit, whole: Fit) -> float:
+    """Part of what a model lacks that another has, in the channel where that is most.
+
+    A channel counts where it is better off by more than the freedom of one more effect is worth to the
+    Bayesian information criterion (Schwarz 1978): the logarithm of its independent samples, for each number.
+
+    Args:
+        bench: the measured series.
+        without: the model that lacks something.
+        whole: the one that has it.
+    """
+    noise, less, more = bench.noise_powers, *(bench.channel_powers(f.predictions) for f in (without, whole))
+    rest, series = bench.stacked(bench.residuals(whole.predictions)), bench.stacked_series()
+    blocks, numbers = bench.stacked_blocks(), whole.columns.shape[1] - without.columns.shape[1]
+    best = 0.0
+    for channel in bench.channels:
+        rows = np.isin(series, [k for k, s in enumerate(bench.series) if s.channel == channel])
+        alike = correlation(rest[rows], blocks[rows])
+        worth = float(np.mean(rest[rows] ** 2)) * alike * math.log(max(rows.sum() / alike, 2.0))
+        beyond, gained = less[channel] - noise[channel], less[channel] - more[channel]
+        if gained > worth * max(numbers, 1) and beyond > EXCESS * noise[channel]:
+            best = max(best, min(gained / beyond, 1.0))
+    return best
