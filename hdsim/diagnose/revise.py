@@ -16,7 +16,7 @@ import numpy as np
 from hdsim.diagnose.name import Named
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
-from hdsim.estimate.fit import Fit
+from hdsim.estimate.fit import Fit, at_present, fit
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import together
 
@@ -39,7 +39,7 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
         others: list[Fit | None] = []
         for k, one in enumerate(named):
             tell(f"without {one.name}")
-            others.append(_without(bench, current, k))
+            others.append(_without(bench, current, k, rough=len(named) == 2))
             one.needed = needed(bench, others[-1], current) if others[-1] is not None else 1.0
         k = min(range(len(named)), key=lambda k: named[k].needed)
         without = others[k]
@@ -53,11 +53,25 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
     return current
 
 
-def _without(bench: Bench, current: Fit, k: int) -> Fit | None:
+def _without(bench: Bench, current: Fit, k: int, *, rough: bool) -> Fit | None:
+    """The model without an effect, all the rest fitted anew from where it was; None where that fails.
+
+    Args:
+        bench: the measured series.
+        current: the model with it.
+        k: which of its effects.
+        rough: of two names neither can have been needed for the sake of the other alone.
+    """
     added = current.state.added
+    widths = [len(one.coefficients) + len(one.shapes) for one in added]
+    first = len(current.frees) + sum(widths[:k])
+    columns = np.delete(current.columns, np.s_[first : first + widths[k]], axis=1)
     state = replace(current.state, added=(*added[:k], *added[k + 1 :]))
     try:
-        return together(bench, current, state)
+        return fit(
+            bench, state, at_present(current), prune=False, after=current, known=(columns, math.nan),
+            rough=rough,
+        )  # fmt: skip
     except (PredictionError, np.linalg.LinAlgError):
         return None
 

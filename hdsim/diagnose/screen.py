@@ -26,6 +26,8 @@ FOLDS, TOGETHER = 5, 2
 #: Draws of the wild bootstrap, and the largest chance at which a search may name an effect.
 DRAWS = 400
 LEVEL = 0.02
+#: Square of a direction's length beside the largest below which it is none: what a Gram matrix can tell.
+NO_DIRECTION = 1e-13
 
 
 @dataclass
@@ -59,9 +61,11 @@ class Residual:
         #: What was taken out, as given.
         self.base = base
         scale = np.linalg.norm(base, axis=0)
-        base = base[:, scale > 0] / scale[scale > 0]
-        vectors, singular, _ = np.linalg.svd(base, full_matrices=False) if base.size else (base, [], None)
-        self._base = vectors[:, np.asarray(singular) > 1e-8] if base.size else np.zeros((len(values), 0))
+        self._base = base[:, scale > 0] / scale[scale > 0]
+        # Their Gram matrix tells the directions at a part of what decomposing the long columns costs.
+        powers, vectors = np.linalg.eigh(self._base.T @ self._base)
+        seen = powers > NO_DIRECTION * max(float(powers.max(initial=0.0)), 1e-300)
+        self._turned = vectors[:, seen] / np.sqrt(powers[seen])
         self.values = self.project(values)
         used, self._blocks = np.unique(blocks, return_inverse=True)
         self.count = len(used)
@@ -74,7 +78,9 @@ class Residual:
 
     def project(self, values: Array) -> Array:
         """Without what the base's directions explain; shape of ``values``."""
-        return np.asarray(values - self._base @ (self._base.T @ values))
+        for _ in range(2):  # once leaves what the Gram matrix has lost
+            values = values - self._base @ (self._turned @ (self._turned.T @ (self._base.T @ values)))
+        return values
 
     def share(self, columns: Array, rows: NDArray[np.bool_] | None = None) -> Share:
         """What a design of shape (n, k) explains.

@@ -25,6 +25,8 @@ WEIGHINGS, ALIKE = 3, 1.5
 ALL = 0.1
 #: Prior spreads that a number may have gone for a fit to begin at the given one too.
 FAR = 2.0
+#: What a fit may leave, in units of the noise, to leave nothing to be found from elsewhere.
+REACHED = 1.05
 
 
 @dataclass
@@ -145,11 +147,10 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
     readings = replace(found, undetermined=[f for f in found.undetermined if f.reading], beside=None)
     # A number that a missing effect has driven to nearly nothing leaves no slope to come back by.
     far = {f.name: f.none for f in frees if not f.step and abs(f.none) > FAR * f.prior}
-    begins = [None, far] if far else [None]
-    tried = [
-        fit(bench, state or found.state, frees, theta=begin, after=readings, rough=rough) for begin in begins
-    ]
-    whole = min(tried, key=lambda each: bench.power(each.predictions))
+    whole = fit(bench, state or found.state, frees, after=readings, rough=rough)
+    if far and bench.power(whole.predictions) > REACHED * sum(bench.noise_powers.values()):
+        other = fit(bench, state or found.state, frees, theta=far, after=readings, rough=rough)
+        whole = min(whole, other, key=lambda each: bench.power(each.predictions))
     if not rough:
         _widened(bench, whole)
     return whole
