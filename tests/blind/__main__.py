@@ -11,10 +11,12 @@ from pathlib import Path
 
 from contract import AbsentError
 from judging import Line, outcome, said
-from running import FAMILIES, Task, attempt, family, keep, lines_of, run, stored, task_of
+from running import FAMILIES, Task, attempt, family, keep, lines_of, run, store, stored, task_of
 
 #: Never used to calibrate, whatever its seeds: what is stated of it, no rule has seen.
 LEFT_OUT = "mujoco"
+#: Cases of the page, packed.
+KEPT = Path(__file__).parent / "results.jsonl.gz"
 
 
 def numbers_of(text: str) -> list[int]:
@@ -117,6 +119,13 @@ def page(given: argparse.Namespace) -> None:
     print(f"{len(lines)} cases: {given.write}")
 
 
+def keep_all(given: argparse.Namespace) -> None:
+    """Pack stored cases into the file that the page is written from."""
+    lines = lines_of(given.results)
+    store(lines, given.write)
+    print(f"{len(lines)} cases: {given.write}, {given.write.stat().st_size / 1e6:.1f} MB")
+
+
 def calibrate(given: argparse.Namespace) -> None:
     """Hand the lines that rules may be calibrated on to ``calibrate.calibrate``."""
     lines = lines_of(given.results)
@@ -162,15 +171,18 @@ def main() -> None:
     command.set_defaults(run=one)
     for name, call, text in (
         ("show", show, "print stored cases whose key holds the text"),
+        ("store", keep_all, "pack stored cases into the file that the page is written from"),
         ("page", page, "write the page"),
         ("calibrate", calibrate, "calibrate rules on stored cases of even seeds"),
     ):
         command = commands.add_parser(name, help=text)
         if name == "show":
             command.add_argument("key")
-        if name == "page":
-            command.add_argument("--write", type=Path, default=Path("docs/blind.md"))
-        command.add_argument("--results", type=paths, default=[Path("results/blind.jsonl")],
+        if name in ("page", "store"):
+            command.add_argument(
+                "--write", type=Path, default=Path("docs/blind.md") if name == "page" else KEPT
+            )
+        command.add_argument("--results", type=paths, default=[Path("results/blind.jsonl"), KEPT],
                              help="files, comma-separated")  # fmt: skip
         command.set_defaults(run=call)
     given = parser.parse_args()

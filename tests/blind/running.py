@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import concurrent.futures
+import gzip
 import importlib
 import json
 import multiprocessing
@@ -187,13 +188,34 @@ def lines_of(paths: Sequence[Path]) -> list[Line]:
     """Stored lines, the last of each case; one that was cut off is left out."""
     found: dict[Task, Line] = {}
     for path in paths:
-        for text in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        for text in _text(path).splitlines() if path.exists() else ():
             try:
                 line = json.loads(text)
             except json.JSONDecodeError:
                 continue
             found[Task(line["family"], line["number"], line["seed"])] = line
     return list(found.values())
+
+
+def _text(path: Path) -> str:
+    if path.suffix == ".gz":
+        return gzip.decompress(path.read_bytes()).decode()
+    return path.read_text(encoding="utf-8")
+
+
+def store(lines: Sequence[Line], path: Path) -> None:
+    """Keep lines where everybody can judge them again: packed, sorted, six digits of every number."""
+    ordered = sorted(lines, key=lambda line: (line["family"], line["seed"], line["number"]))
+    text = "\n".join(stored(_rounded(json.loads(stored(line)))) for line in ordered)
+    path.write_bytes(gzip.compress(text.encode(), mtime=0))
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    if isinstance(value, dict):
+        return {key: _rounded(part) for key, part in value.items()}
+    return [_rounded(part) for part in value] if isinstance(value, list) else value
 
 
 def run(
