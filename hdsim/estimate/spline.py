@@ -8,7 +8,7 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.estimate.noise import quantisation_step
-from hdsim.estimate.records import Array
+from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -21,6 +21,8 @@ TAIL_S = 0.02
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
 #: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
 STEPS_ALLOW = 1.1
+#: Stretches of time over which a rate judges two splines, and standard errors by which one must be better.
+STRETCHES, CLEARLY = 30, 2.0
 #: Part of its own size that the other splines leave of a B-spline, squared, below which rounding decides.
 SINGULAR = 1e-12
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
@@ -28,7 +30,12 @@ SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 
 
 def smoothed(
-    time: Array, values: Array, *, motion: bool = False, step: float | None = None
+    time: Array,
+    values: Array,
+    *,
+    motion: bool = False,
+    step: float | None = None,
+    rate: tuple[Array, Mask] | None = None,
 ) -> tuple[Array, Array]:
     """Knots (k + 1,) and cubic coefficients (4, k) of the spline that predicts left-out samples best.
 
@@ -37,11 +44,17 @@ def smoothed(
     The steps of a quantised reading are no white noise, and fine knots would follow them: of the splines that
     leave no more than the steps allow, q / sqrt(12), the coarsest is taken where it is coarser.
 
+    Errors that last for some samples (a jittering clock, a resolver) are no white noise either: what is left
+    out is foretold by its neighbours' errors, fine knots follow them (Altman 1990, Journal of the American
+    Statistical Association 85:749), and differentiated twice they drown the acceleration. Where the rate is
+    measured as well, the splines are judged by it: by what they were not fitted to.
+
     Args:
         time: shape (n,), s, strictly increasing.
         values: shape (n,).
         motion: the values are an angle, whose acceleration may jump where friction changes its sign.
         step: q of the sensor; found in the values when None.
+        rate: their measured derivative in any unit, shape (n,), and which samples of it count, shape (n,).
     """
     from scipy.interpolate import CubicSpline, PPoly
 
@@ -49,6 +62,9 @@ def smoothed(
     if chosen is None:
         exact = CubicSpline(time, values)
         return np.asarray(exact.x), np.asarray(exact.c[::-1])
+    if rate is not None:
+        chosen = borne_out(time, values, chosen, *rate)
+        best = _score(time, values, chosen)
     if motion:
         jumping = _jumping(time, values, chosen)
         if jumping is not None and _score(time, values, jumping) < best:
@@ -117,6 +133,42 @@ def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[
     if coarse is not None and chosen is not None and len(coarse[1].c) < len(chosen.c):
         return coarse
     return best, chosen
+
+
+def borne_out(time: Array, values: Array, chosen: BSpline, rate: Array, trusted: Mask) -> BSpline:
+    """The spline, or a coarser one whose derivative clearly foretells the measured rate better.
+
+    Only coarser ones are asked: a rate that was differenced from the same readings shares their errors, and
+    would have finer ones follow them.
+
+    Args:
+        time: shape (n,), s.
+        values: shape (n,).
+        chosen: the spline through the values.
+        rate: shape (n,), in any unit.
+        trusted: shape (n,), samples of the rate that count.
+    """
+    stretch = (np.arange(len(time)) * STRETCHES // len(time))[trusted]
+
+    def missed(spline: BSpline) -> Array:
+        """Square of what the derivative does not foretell, summed over each stretch."""
+        columns = np.column_stack([spline(time[trusted], nu=1), np.ones(int(trusted.sum()))])
+        ours, *_ = np.linalg.lstsq(columns, rate[trusted], rcond=None)
+        return np.bincount(stretch, (rate[trusted] - columns @ ours) ** 2, STRETCHES)
+
+    before = least = missed(chosen)
+    for spacing in SPACINGS:
+        if int((len(time) - 1) / spacing) < 4:
+            break
+        spline = _uniform(time, values, spacing)
+        if spline is None or len(spline.c) >= len(chosen.c):
+            continue
+        now = missed(spline)
+        better = before - now
+        clear = better.sum() > CLEARLY * np.sqrt(STRETCHES) * better.std()
+        if clear and now.sum() < least.sum():
+            chosen, least = spline, now
+    return chosen
 
 
 def _uniform(time: Array, values: Array, spacing: float) -> BSpline | None:
