@@ -23,6 +23,8 @@ SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 1
 STEPS_ALLOW = 1.1
 #: Stretches of time over which a rate judges two splines, and standard errors by which one must be better.
 STRETCHES, CLEARLY = 30, 2.0
+#: Delays of a rate's low-pass that are tried, in samples.
+DELAYS = (0.0, *(2.0**k for k in np.arange(-1.0, 6.1, 0.5)))
 #: Part of its own size that the other splines leave of a B-spline, squared, below which rounding decides.
 SINGULAR = 1e-12
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
@@ -139,7 +141,8 @@ def borne_out(time: Array, values: Array, chosen: BSpline, rate: Array, trusted:
     """The spline, or a coarser one whose derivative clearly foretells the measured rate better.
 
     Only coarser ones are asked: a rate that was differenced from the same readings shares their errors, and
-    would have finer ones follow them.
+    would have finer ones follow them. A rate may be filtered, and its filter follows from the slow motion
+    that both splines have: behind it the detail that one of them lacks must show, if it is real.
 
     Args:
         time: shape (n,), s.
@@ -150,25 +153,38 @@ def borne_out(time: Array, values: Array, chosen: BSpline, rate: Array, trusted:
     """
     stretch = (np.arange(len(time)) * STRETCHES // len(time))[trusted]
 
-    def missed(spline: BSpline) -> Array:
-        """Square of what the derivative does not foretell, summed over each stretch."""
-        columns = np.column_stack([spline(time[trusted], nu=1), np.ones(int(trusted.sum()))])
+    def missed(spline: BSpline, delay: float, order: int) -> Array:
+        """Power of the rate in each stretch that the filtered derivative does not foretell."""
+        read = _filtered(spline(time, nu=1), delay, order)
+        columns = np.column_stack([read, np.ones(len(time))])[trusted]
         ours, *_ = np.linalg.lstsq(columns, rate[trusted], rcond=None)
-        return np.bincount(stretch, (rate[trusted] - columns @ ours) ** 2, STRETCHES)
+        return np.bincount(stretch, (rate[trusted] - columns @ ours) ** 2, STRETCHES) + 1e-300
 
-    before = least = missed(chosen)
+    best, least = chosen, np.inf
     for spacing in SPACINGS:
         if int((len(time) - 1) / spacing) < 4:
             break
         spline = _uniform(time, values, spacing)
         if spline is None or len(spline.c) >= len(chosen.c):
             continue
-        now = missed(spline)
-        better = before - now
-        clear = better.sum() > CLEARLY * np.sqrt(STRETCHES) * better.std()
-        if clear and now.sum() < least.sum():
-            chosen, least = spline, now
-    return chosen
+        tried = [(missed(spline, delay, order), delay, order) for delay in DELAYS for order in (1, 2)]
+        now, delay, order = min(tried, key=lambda one: float(one[0].sum()))
+        # Of the logarithms a hiccup of the log counts as one stretch among the others.
+        better = np.log(missed(chosen, delay, order) / now)
+        clear = float(better.mean()) > CLEARLY * float(better.std()) / np.sqrt(STRETCHES)
+        if clear and now.sum() < least:
+            best, least = spline, float(now.sum())
+    return best
+
+
+def _filtered(values: Array, delay: float, order: int) -> Array:
+    """Values behind equal first-order low-passes in series, which together delay by so many samples."""
+    from scipy.signal import lfilter
+
+    old = delay / (delay + order)
+    for _ in range(order if delay > 0 else 0):
+        values, _ = lfilter([1.0 - old], [1.0, -old], values, zi=[old * values[0]])
+    return values
 
 
 def _uniform(time: Array, values: Array, spacing: float) -> BSpline | None:
