@@ -16,8 +16,8 @@ CYCLOIDAL = DATA / "cycloidal-backlash-hysteresis" / "2024-07-11__15-56-27__torq
 #: Coulomb friction (N m at the output) of a straight-line fit of motor torque less sensor torque over the
 #: velocity and its sign.
 FRICTION = {1: 2.66, 3: 2.17, 4: 2.44, 6: 1.18}
-#: What least squares of the motor's torque leave in the held-out stretches, N m at the motor: over velocity and
-#: its sign of a spline with a knot each 72 ms, beside inertia and the sensor's torque.
+#: What least squares of the motor's torque leave in the held-out stretches, N m at the motor: over velocity
+#: and its sign of a spline with a knot each 72 ms, beside inertia and the sensor's torque.
 REGRESSED_NM = {1: 0.0085, 3: 0.0093, 4: 0.0102, 6: 0.0047}
 #: Joint 6 turns one way in its held-out stretches: there friction is an offset, and no gap.
 ONE_WAY = {6}
