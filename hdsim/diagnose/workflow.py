@@ -25,6 +25,7 @@ from hdsim.estimate.data_problems import Check
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.estimate.numbers import Interval
+from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
 from hdsim.estimate.predict import LoadSource, PredictionError
 from hdsim.estimate.prove import borne_out, gaps
@@ -86,11 +87,7 @@ def diagnose(
     Raises:
         InputError: the data cannot answer the question, or are suspect (see ``force``).
     """
-    from threadpoolctl import threadpool_limits
-
-    # Its matrices are narrow: threads inside each product cost more than they give, and those outside it
-    # already use the cores.
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         return _diagnosed(measured, scenario, holdout, load, force, on_step or (lambda _: None))
 
 

@@ -16,6 +16,7 @@ from hdsim.estimate.determine import UNDETERMINED
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.found import Gap
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, undeclared
+from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked
 from hdsim.estimate.predict import LoadSource, PredictionError
 from hdsim.estimate.prove import gaps
@@ -92,6 +93,7 @@ class Estimation:
         return [interval.name for interval in self.intervals if interval.moved]
 
 
+@one_blas_thread()
 def estimate(
     measured: Sequence[Recording | Record],
     scenario: Scenario,

@@ -27,6 +27,8 @@ from hdsim.estimate.vector import Measured, Vector, sensitivities
 
 #: Largest logarithm of the factor to either end of an interval: e^20 says enough of what nobody knows.
 WIDEST = 20.0
+#: Least absolute correlation of numbers that are tied: one alone would be known more than twice as well.
+TIED = 0.9
 
 
 @dataclass
@@ -184,7 +186,10 @@ def at_present(found: Fit) -> list[Free]:
 
 
 def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
-    """The base's numbers with 95 % intervals; those that were left alone are marked undetermined.
+    """The base's numbers with 95 % intervals; those that the data do not bound are marked undetermined.
+
+    They were left alone, or the fit knows them no better than was believed before it: what such an interval
+    excludes, its prior and the other numbers exclude, and not the data.
 
     Args:
         found: the fit.
@@ -196,12 +201,26 @@ def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
         now, spread = float(found.theta[k]), min(2.0 * math.sqrt(found.covariance[k, k]), WIDEST)
         value, low, high = free.at(now), free.at(now - spread), free.at(now + spread)
         start = first.get(free.name, free.value)
-        intervals.append(Interval(free.name, value, start, low, high, free.unit, delay_of=free.delay_of))
+        bound = found.covariance[k, k] < free.prior**2
+        if not bound:
+            low = high = math.nan
+        tied = [] if bound else _tied(found, k)
+        intervals.append(
+            Interval(free.name, value, start, low, high, free.unit, bound, tied, delay_of=free.delay_of)
+        )
     for free in found.undetermined:
         start, tied = first.get(free.name, free.value), found.ties.get(free.name, [])
         nan = math.nan
         intervals.append(Interval(free.name, free.value, start, nan, nan, free.unit, False, tied))
     return intervals
+
+
+def _tied(found: Fit, k: int) -> list[str]:
+    """Numbers of the base that move with the ``k``-th where that moves."""
+    own = found.covariance[: len(found.frees), : len(found.frees)]
+    spreads = np.sqrt(np.diag(own))
+    with_it = np.abs(own[k]) / (spreads * spreads[k])
+    return [free.name for j, free in enumerate(found.frees) if j != k and with_it[j] >= TIED]
 
 
 def added_spreads(found: Fit, held_effects: int = 0) -> list[tuple[Added, Array, Array]]:

@@ -159,9 +159,8 @@ class Predictor:
         #: The prescribed reading, shape (n,), counted from the motor's zero that is next to the output's.
         values = self._reading = record.filled(plan.motion) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
-        breaks, coefficients = smoothed(
-            record.time, values, motion=not plan.locked, step=self._step(plan.motion)
-        )
+        moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
+        breaks, coefficients = smoothed(record.time, values, motion=moves, step=step, rate=rate)
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
         self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
         coefficients = coefficients * self._factor

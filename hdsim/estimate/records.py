@@ -86,6 +86,13 @@ class Record:
         """Channels with more than a few readings that can be trusted."""
         return {c for c, good in self.trusted.items() if good.sum() > 20}
 
+    def rate(self, angle: str) -> tuple[Array, Mask] | None:
+        """The measured velocity of an angle's side with its trusted samples, (n,) each; None without one."""
+        velocity = angle.replace("_angle", "_velocity")
+        if velocity not in self.readable or np.ptp(self.filled(velocity)) == 0.0:
+            return None
+        return self.filled(velocity), self.trusted[velocity]
+
     def filled(self, channel: str) -> Array:
         """A channel with untrusted samples replaced by linear interpolation, shape (n,)."""
         good = self.trusted[channel]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import robust_covariance
+from hdsim.estimate.covariance import correlation, robust_covariance
 from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
@@ -150,10 +150,24 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
     whole = fit(bench, state or found.state, frees, after=readings, rough=rough)
     if far and bench.power(whole.predictions) > REACHED * sum(bench.noise_powers.values()):
         other = fit(bench, state or found.state, frees, theta=far, after=readings, rough=rough)
-        whole = min(whole, other, key=lambda each: bench.power(each.predictions))
-    if not rough:
-        _widened(bench, whole)
+        whole = min(whole, other, key=lambda each: _against(bench, each, whole))
+    if rough:
+        return whole
+    left = [free for free in whole.undetermined if not free.reading]
+    if left:
+        # What was left as given holds what it is tied to where the data would have moved both. At the end all
+        # numbers share by their priors, and none seems known because another was held.
+        whole = fit(bench, whole.state, [*at_present(whole), *left], prune=False, after=readings)
+    _widened(bench, whole)
     return whole
+
+
+def _against(bench: Bench, found: Fit, like: Fit) -> float:
+    """What data and priors have against a fit, in units of an independent sample of what ``like`` leaves."""
+    rest = bench.stacked(bench.residuals(like.predictions))
+    power = max(correlation(rest, bench.stacked_blocks()) * float(np.mean(rest**2)), 1e-30)
+    far = [(t - free.none) / free.prior for t, free in zip(found.theta, found.frees, strict=True)]
+    return bench.power(found.predictions) / power + float(np.sum(np.square(far)))
 
 
 def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.estimate.noise import quantisation_step
-from hdsim.estimate.records import Array
+from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -21,6 +21,10 @@ TAIL_S = 0.02
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
 #: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
 STEPS_ALLOW = 1.1
+#: Stretches of time over which a rate judges two splines, and standard errors by which one must be better.
+STRETCHES, CLEARLY = 30, 2.0
+#: Delays of a rate's low-pass that are tried, in samples.
+DELAYS = (0.0, *(2.0**k for k in np.arange(-1.0, 6.1, 0.5)))
 #: Part of its own size that the other splines leave of a B-spline, squared, below which rounding decides.
 SINGULAR = 1e-12
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
@@ -28,7 +32,12 @@ SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 
 
 def smoothed(
-    time: Array, values: Array, *, motion: bool = False, step: float | None = None
+    time: Array,
+    values: Array,
+    *,
+    motion: bool = False,
+    step: float | None = None,
+    rate: tuple[Array, Mask] | None = None,
 ) -> tuple[Array, Array]:
     """Knots (k + 1,) and cubic coefficients (4, k) of the spline that predicts left-out samples best.
 
@@ -37,11 +46,17 @@ def smoothed(
     The steps of a quantised reading are no white noise, and fine knots would follow them: of the splines that
     leave no more than the steps allow, q / sqrt(12), the coarsest is taken where it is coarser.
 
+    Errors that last for some samples (a jittering clock, a resolver) are no white noise either: what is left
+    out is foretold by its neighbours' errors, fine knots follow them (Altman 1990, Journal of the American
+    Statistical Association 85:749), and differentiated twice they drown the acceleration. Where the rate is
+    measured as well, the splines are judged by it: by what they were not fitted to.
+
     Args:
         time: shape (n,), s, strictly increasing.
         values: shape (n,).
         motion: the values are an angle, whose acceleration may jump where friction changes its sign.
         step: q of the sensor; found in the values when None.
+        rate: their measured derivative in any unit, shape (n,), and which samples of it count, shape (n,).
     """
     from scipy.interpolate import CubicSpline, PPoly
 
@@ -49,6 +64,9 @@ def smoothed(
     if chosen is None:
         exact = CubicSpline(time, values)
         return np.asarray(exact.x), np.asarray(exact.c[::-1])
+    if rate is not None:
+        chosen = borne_out(time, values, chosen, *rate)
+        best = _score(time, values, chosen)
     if motion:
         jumping = _jumping(time, values, chosen)
         if jumping is not None and _score(time, values, jumping) < best:
@@ -117,6 +135,56 @@ def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[
     if coarse is not None and chosen is not None and len(coarse[1].c) < len(chosen.c):
         return coarse
     return best, chosen
+
+
+def borne_out(time: Array, values: Array, chosen: BSpline, rate: Array, trusted: Mask) -> BSpline:
+    """The spline, or a coarser one whose derivative clearly foretells the measured rate better.
+
+    Only coarser ones are asked: a rate that was differenced from the same readings shares their errors, and
+    would have finer ones follow them. A rate may be filtered, and its filter follows from the slow motion
+    that both splines have: behind it the detail that one of them lacks must show, if it is real.
+
+    Args:
+        time: shape (n,), s.
+        values: shape (n,).
+        chosen: the spline through the values.
+        rate: shape (n,), in any unit.
+        trusted: shape (n,), samples of the rate that count.
+    """
+    stretch = (np.arange(len(time)) * STRETCHES // len(time))[trusted]
+
+    def missed(spline: BSpline, delay: float, order: int) -> Array:
+        """Power of the rate in each stretch that the filtered derivative does not foretell."""
+        read = _filtered(spline(time, nu=1), delay, order)
+        columns = np.column_stack([read, np.ones(len(time))])[trusted]
+        ours, *_ = np.linalg.lstsq(columns, rate[trusted], rcond=None)
+        return np.bincount(stretch, (rate[trusted] - columns @ ours) ** 2, STRETCHES) + 1e-300
+
+    best, least = chosen, np.inf
+    for spacing in SPACINGS:
+        if int((len(time) - 1) / spacing) < 4:
+            break
+        spline = _uniform(time, values, spacing)
+        if spline is None or len(spline.c) >= len(chosen.c):
+            continue
+        tried = [(missed(spline, delay, order), delay, order) for delay in DELAYS for order in (1, 2)]
+        now, delay, order = min(tried, key=lambda one: float(one[0].sum()))
+        # Of the logarithms a hiccup of the log counts as one stretch among the others.
+        better = np.log(missed(chosen, delay, order) / now)
+        clear = float(better.mean()) > CLEARLY * float(better.std()) / np.sqrt(STRETCHES)
+        if clear and now.sum() < least:
+            best, least = spline, float(now.sum())
+    return best
+
+
+def _filtered(values: Array, delay: float, order: int) -> Array:
+    """Values behind equal first-order low-passes in series, which together delay by so many samples."""
+    from scipy.signal import lfilter
+
+    old = delay / (delay + order)
+    for _ in range(order if delay > 0 else 0):
+        values, _ = lfilter([1.0 - old], [1.0, -old], values, zi=[old * values[0]])
+    return values
 
 
 def _uniform(time: Array, values: Array, spacing: float) -> BSpline | None:

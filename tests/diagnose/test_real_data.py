@@ -16,6 +16,11 @@ CYCLOIDAL = DATA / "cycloidal-backlash-hysteresis" / "2024-07-11__15-56-27__torq
 #: Coulomb friction (N m at the output) of a straight-line fit of motor torque less sensor torque over the
 #: velocity and its sign.
 FRICTION = {1: 2.66, 3: 2.17, 4: 2.44, 6: 1.18}
+#: What least squares of the motor's torque leave in the held-out stretches, N m at the motor: over velocity
+#: and its sign of a spline with a knot each 72 ms, beside inertia and the sensor's torque.
+REGRESSED_NM = {1: 0.0085, 3: 0.0093, 4: 0.0102, 6: 0.0047}
+#: Joint 6 turns one way in its held-out stretches: there friction is an offset, and no gap.
+ONE_WAY = {6}
 #: Names of one thing for these data: friction that turns with the direction.
 FRICTIONS = {"input_coulomb_viscous", "lugre_friction", "load_dependent_loss", "stribeck_friction"}
 
@@ -44,7 +49,13 @@ def test_kinova_joints_lack_friction_first_and_the_gap_falls_below_a_third(joint
     if first.name == "input_coulomb_viscous":
         assert 100 * first.parameters["coulomb_nm"].value == pytest.approx(FRICTION[joint], rel=0.35)
     gap = found.gap["motor_torque"]
-    assert gap.after < gap.before / 3
+    assert gap.after < 1.05 * REGRESSED_NM[joint]
+    assert joint in ONE_WAY or gap.after < gap.before / 3
+    # Of the bound of the search nothing is told: the acceleration is the motion's, not its readings' errors'.
+    inertia = found.parameters["drive.inertia.motor_kg_m2"]
+    assert inertia.value > 0.1 * inertia.start
+    if joint not in ONE_WAY:
+        assert inertia.value == pytest.approx(inertia.start, rel=0.8)
     # The mapping masks the control loop's hiccups, or the check finds them: said either way.
     assert any(p.kind in ("spikes", "missing") and p.channel == "motor_torque" for p in found.data_problems)
     if joint == 6:
