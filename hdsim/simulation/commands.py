@@ -83,7 +83,7 @@ def run(
     if done.failure:
         click.echo(f"error: the run stopped early: {done.failure}", err=True)
         return 1
-    return 0
+    return 1 if done.audit.gave_back else 0
 
 
 def tell(run: Run, duration_s: float) -> None:
