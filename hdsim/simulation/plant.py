@@ -59,7 +59,7 @@ class Plant:
     """
 
     def __init__(self, scenario: Scenario, outputs: tuple[str, ...] | None = None) -> None:
-        drive = scenario.drive
+        drive = scenario.drive.resolved()
         self.model = Model(
             drive,
             plant_parts(scenario),
