@@ -50,8 +50,11 @@ def run(
     except OSError as error:
         raise InputError(f"{path.parent}: cannot be made ({error.strerror})") from error
 
+    from hdsim.scenario.doubts import doubts
     from hdsim.simulation.simulate import simulate_to_log
 
+    for doubt in doubts(loaded):
+        click.echo(f"{scenario}: warning: {doubt}", err=True)
     session = None
     if live:
         from hdsim.live.session import LiveRun
