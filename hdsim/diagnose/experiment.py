@@ -265,7 +265,9 @@ def _simulated(
         load = load.model_copy(update={"torque": None})
         parts.append(MeasuredTorque(experiment.load_torque))
     parts.append(load)
-    model = Model(drive, parts, load_inertia_kg_m2=load.inertia_kg_m2, motions=motions, seed=candidate.seed)
+    model = Model(
+        drive.resolved(), parts, load_inertia_kg_m2=load.inertia_kg_m2, motions=motions, seed=candidate.seed
+    )
     run = Run(model, duration_s=experiment.duration_s, sample_rate_hz=rate, rtol=RTOL)
     got = run.record()
     if run.failure:

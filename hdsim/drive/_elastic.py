@@ -25,10 +25,8 @@ from hdsim.drive._layout import (
     RING_DYNAMIC,
     RING_STATIC,
     S_ACCELERATIONS,
-    S_ANGLES,
     S_CONSTRAINT,
     S_ERROR,
-    S_HOUSING,
     S_INPUTS,
     S_KINETIC,
     S_MESH,
@@ -36,12 +34,14 @@ from hdsim.drive._layout import (
     S_POTENTIAL,
     S_RELATIVE,
     S_RING_1,
+    S_RING_2,
     S_TWIST_1,
     S_VELOCITIES,
     SIGNAL_OF,
     STATE_OF,
     STATES,
 )
+from hdsim.drive._ring import balance_ring, ring_curvature
 from hdsim.drive._terms import fill_inputs, read_coordinates, read_error, run_elements, scatter
 from hdsim.kernel import (
     DELIVERED,
@@ -63,55 +63,6 @@ from hdsim.kernel import (
 )
 
 _jit: Any = compiled
-
-
-@_jit
-def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
-    """Ring angle at which mesh and structure balance: safeguarded Newton on the convex potential."""
-    angles = scratch[S_RELATIVE : S_RELATIVE + 3]
-    error = scratch[S_ERROR : S_ERROR + 6]
-    result = scratch[S_MESH : S_MESH + _mesh_layout.RESULT_SIZE]
-    parameters = reals[integers[MESH_AT] :]
-    free = reals[KAPPA] * angles[2]
-    loaded = reals[GAIN] * (angles[0] * reals[INVERSE_RATIO] - reals[OUTPUT_SHARE] * angles[2] + error[0])
-    # Wider than from free to loaded: pitch errors push without a twist, the window's slope pulls.
-    margin = 1e-5 + parameters[_mesh_layout.LARGEST_PITCH_ERROR] / parameters[_mesh_layout.LEVER]
-    low = min(free, loaded) - margin
-    high = max(free, loaded) + margin
-    angles[1] = free + 0.7 * (loaded - free)
-    for _ in range(100):
-        call_mesh(integers[MESH_ADDRESS], angles, error, parameters, result)
-        slope = result[_mesh_layout.GRADIENT + 1]
-        if slope > 0.0:
-            high = angles[1]
-        else:
-            low = angles[1]
-        step = -slope / result[_mesh_layout.HESSIAN + 3]
-        following = angles[1] + step
-        if not (low <= following <= high):
-            following = 0.5 * (low + high)
-            step = following - angles[1]
-        if abs(step) <= 1e-14 * (1e-3 + abs(following - free)) or following == angles[1]:
-            break
-        angles[1] = following
-    stiffness = result[_mesh_layout.HESSIAN + 3]
-    scratch[S_RING_1] = -result[_mesh_layout.HESSIAN + 1] / stiffness
-    scratch[S_RING_1 + 1] = 0.0
-    scratch[S_RING_1 + 2] = -result[_mesh_layout.HESSIAN + 4] / stiffness
-    # Schur complement: Hessian of the potential with the ring at its balance.
-    mf = result[_mesh_layout.HESSIAN + 1]
-    fo = result[_mesh_layout.HESSIAN + 4]
-    result[_mesh_layout.HESSIAN] -= mf * mf / stiffness
-    result[_mesh_layout.HESSIAN + 2] -= mf * fo / stiffness
-    result[_mesh_layout.HESSIAN + 5] -= fo * fo / stiffness
-    result[_mesh_layout.HESSIAN + 1] = 0.0
-    result[_mesh_layout.HESSIAN + 4] = 0.0
-    result[_mesh_layout.GRADIENT + 1] = 0.0
-    scratch[S_RELATIVE + 4] = (
-        scratch[S_RING_1] * scratch[S_RELATIVE + 3] + scratch[S_RING_1 + 2] * scratch[S_RELATIVE + 5]
-    )
-    scratch[S_ANGLES + 1] = scratch[S_RELATIVE + 1] + scratch[S_HOUSING]
-    scratch[S_VELOCITIES + 1] = scratch[S_RELATIVE + 4] + scratch[S_HOUSING + 1]
 
 
 @_jit
@@ -152,6 +103,19 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         meshing[0] = gain * (inverse + error[1])
         meshing[1] = -1.0
         meshing[2] = gain * (error[2] - reals[OUTPUT_SHARE])
+        curved_torsion = 0.0
+        curved_mesh = gain
+        twist = result[_mesh_layout.TWIST]
+        mesh_twist = result[_mesh_layout.MESH_TWIST]
+    elif ring == RING_STATIC:
+        # Twist of the cup alone, as with a ring of its own: the gap is in the mesh, where nothing damps it.
+        gain = reals[GAIN]
+        torsion[0] = scratch[S_RING_1]
+        torsion[1] = 0.0
+        torsion[2] = scratch[S_RING_1 + 2] - reals[KAPPA]
+        meshing[0] = gain * (inverse + error[1]) - scratch[S_RING_1]
+        meshing[1] = 0.0
+        meshing[2] = gain * (error[2] - reals[OUTPUT_SHARE]) - scratch[S_RING_1 + 2]
         curved_torsion = 0.0
         curved_mesh = gain
         twist = result[_mesh_layout.TWIST]
@@ -233,6 +197,10 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     vo = seen[2]
     bent_m = error[3] * vm + error[4] * vo
     bent_o = error[4] * vm + error[5] * vo
+    scratch[S_RING_2 : S_RING_2 + 3] = 0.0
+    if ring == RING_STATIC:
+        ring_curvature(integers, reals, scratch)
+    ring_mm, ring_mo, ring_oo = scratch[S_RING_2], scratch[S_RING_2 + 1], scratch[S_RING_2 + 2]
     for r in range(rows):
         row = full[r * columns : (r + 1) * columns]
         d_tau = row[TRANSMITTED_TORQUE]
@@ -252,8 +220,9 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
             row[2 * a] += d_twist * torsion[a] + d_mesh * meshing[a]
             row[2 * a + 1] += d_rate * torsion[a] + d_mesh_rate * meshing[a]
         bent = d_rate * curved_torsion + d_mesh_rate * curved_mesh
-        row[MOTOR_ANGLE] += bent * bent_m - d_tau * h_mo
-        row[OUTPUT_ANGLE] += bent * bent_o - d_tau * h_oo
+        moved = d_rate - d_mesh_rate
+        row[MOTOR_ANGLE] += bent * bent_m - d_tau * h_mo + moved * (ring_mm * vm + ring_mo * vo)
+        row[OUTPUT_ANGLE] += bent * bent_o - d_tau * h_oo + moved * (ring_mo * vm + ring_oo * vo)
         row[RING_ANGLE] -= d_tau * h_fo
         if housing > 0:
             # What came in through the mesh depends on the angles as seen from the housing.
@@ -263,10 +232,12 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
             row[housing + 1] -= row[MOTOR_ANGLE + 1] + row[RING_ANGLE + 1] + row[OUTPUT_ANGLE + 1]
     # Torque rows: the ports' rows through their levers, then the potential.
     bent = outputs[TWIST_TORQUE] * curved_torsion + outputs[MESH_TORQUE] * curved_mesh
+    moved = outputs[TWIST_TORQUE] - outputs[MESH_TORQUE]
+    slope_mo = bent * error[4] - h_mo + moved * ring_mo
     slopes = (
-        (bent * error[3] - h_mm, -h_mf, bent * error[4] - h_mo),
+        (bent * error[3] - h_mm + moved * ring_mm, -h_mf, slope_mo),
         (-h_mf, -h_ff, -h_fo),
-        (bent * error[4] - h_mo, -h_fo, bent * error[5] - h_oo),
+        (slope_mo, -h_fo, bent * error[5] - h_oo + moved * ring_oo),
     )
     for a in range(3):
         through = slopes[a][0] + slopes[a][1] + slopes[a][2]

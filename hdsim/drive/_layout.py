@@ -55,4 +55,6 @@ S_LEAST_HEAT = 46  # heat of the account that has least, if negative, W
 S_LEAST_ACCOUNT = 47
 S_HOUSING = 48  # angle and velocity
 S_RELATIVE = 50  # three angles and three velocities as seen from the housing
-S_INPUTS = 56  # then outputs, Jacobian, and the heat of each account
+S_SPARE = 56  # a mesh kernel's result beside the current angles
+S_RING_2 = 72  # second derivatives (mm, mo, oo) of the eliminated ring angle, with the Jacobian
+S_INPUTS = 75  # then outputs, Jacobian, and the heat of each account

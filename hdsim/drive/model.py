@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Scale of a motor speed at rest, in smoothing speeds of its friction's sign: it is held to 1e-4 of one
+#: at a tolerance of 1e-6, and to 1e-2 at 1e-4.
+_SIGNS = 100.0
+
 #: Names of the three coordinates, in the order of the compiled code.
 COORDINATES = ("motor", "ring", "output")
 
@@ -271,6 +275,13 @@ class Model(Contributed):
             scale[at] = angle
             # Velocity of the slow torsional mode at that amplitude.
             scale[at + 1] = angle * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / max(output, 1e-3)))
+        if "motor" in self.place_of:
+            # A sign of the speed over w_s: a stuck shaft that is off by w_s is no longer stuck.
+            at = self.place_of["motor"] + 1
+            signs = [f.smoothing_velocity_rad_per_s for f in self.input_frictions if f.coulomb_nm > 0]
+            if self.drive.friction.load_coefficient > 0:
+                signs.append(self.drive.friction.smoothing_velocity_rad_per_s)
+            scale[at] = min([scale[at], *(_SIGNS * smoothing for smoothing in signs)])
         for k, state in enumerate(self.states):
             y0[size - energies - len(self.states) + k] = state.initial
             scale[size - energies - len(self.states) + k] = state.scale

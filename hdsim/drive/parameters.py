@@ -90,6 +90,13 @@ class Inertia(Parameters):
     """Toothed ring of the flexspline, kg m^2."""
 
 
+#: Default smoothing speed of sign(speed), rad/s of the motor: under 3 N m, where 4 N m drive a size 20 back,
+#: it creeps by 0.3 arcsec a minute. A stuck motor costs the default solver no more steps than a creeping one.
+STICKS_RAD_PER_S = 2e-6
+#: The same where the speed is a measured one, or where a drive is linearised at rest.
+RESOLVED_RAD_PER_S = 0.5
+
+
 class Friction(Parameters):
     """Friction on the input: (Coulomb + c_L |output torque| / ratio) sign(speed) + viscous * speed.
 
@@ -102,8 +109,18 @@ class Friction(Parameters):
     """Viscous friction at the motor shaft, N m s/rad."""
     load_coefficient: Annotated[float, _FRICTION] = Field(0.0, ge=0, lt=1)
     """Share of the transmitted torque, reduced to the motor shaft, that is lost in the mesh (c_L)."""
-    smoothing_velocity_rad_per_s: float = Field(0.5, gt=0)
-    """Motor speed over which sign(speed) is smoothed, rad/s."""
+    smoothing_velocity_rad_per_s: float = Field(STICKS_RAD_PER_S, gt=0)
+    """Motor speed over which sign(speed) is smoothed, rad/s. The default sticks."""
+
+    def resolved(self) -> Friction:
+        """The same with a sign that a measured speed or a linear model can resolve, unless one was chosen.
+
+        A speed from an encoder crosses zero many times while the shaft stands; a sharp sign would make
+        friction torque of that noise. At rest the slope of a sharp sign is a wall.
+        """
+        if self.smoothing_velocity_rad_per_s != STICKS_RAD_PER_S:
+            return self
+        return self.model_copy(update={"smoothing_velocity_rad_per_s": RESOLVED_RAD_PER_S})
 
 
 class WindowEngagement(Parameters):
@@ -206,6 +223,10 @@ class Drive(Parameters):
         from hdsim.drive.presets import preset
 
         return _merged(preset(given["preset"]), given)
+
+    def resolved(self) -> Drive:
+        """The drive as predictions along measured motions and linear models see it: ``Friction.resolved``."""
+        return self.model_copy(update={"friction": self.friction.resolved()})
 
     @property
     def ratio(self) -> float:

@@ -304,7 +304,7 @@ class Predictor:
             }
         try:
             model = Model(
-                candidate.drive,
+                candidate.drive.resolved(),
                 parts,
                 load_inertia_kg_m2=load.inertia_kg_m2,
                 motions=motions,

@@ -77,7 +77,7 @@ def verify_log(path: str | Path) -> VerifyReport:
     All records, chunks, attachments, the data section and the summary against their CRCs; every message
     against its schema; message indexes, chunk indexes, statistics and the other summary records against
     what is there; log times against their order; JSON against NaN; that no channel is empty and that
-    metadata and attachments are there.
+    metadata and attachments are there; that no part of the model gave back heat.
 
     Args:
         path: an MCAP file.
@@ -141,6 +141,8 @@ class _Check:
             case Opcode.METADATA:
                 metadata = scan.parse(records.Metadata, data, span)
                 self.report.metadata.append(metadata.name)
+                if "energy_from_nothing" in metadata.metadata:
+                    self.problem(f"energy from nothing: {metadata.metadata['energy_from_nothing']}")
                 length = span.end - span.start
                 self._metadata_indexes.append(
                     records.MetadataIndex(offset=span.start, length=length, name=metadata.name)

@@ -13,7 +13,8 @@ from hdsim.scenario.problems import Problem, ScenarioError
 @click.command(short_help="Check scenarios and say what they describe.")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
 def check(files: tuple[str, ...]) -> None:
-    """Check scenarios: one line for every mistake, or OK and what each describes."""
+    """Check scenarios: one line for every mistake, or OK, what each describes, and what it hardly means."""
+    from hdsim.scenario.doubts import doubts
     from hdsim.scenario.model import Scenario
 
     problems: list[Problem] = []
@@ -24,6 +25,8 @@ def check(files: tuple[str, ...]) -> None:
             problems += error.problems
         else:
             click.echo(f"{file}: OK\n{scenario.summary()}")
+            for doubt in doubts(scenario):
+                click.echo(f"{file}: warning: {doubt}", err=True)
     if problems:
         raise ScenarioError(problems)
 

@@ -50,8 +50,11 @@ def run(
     except OSError as error:
         raise InputError(f"{path.parent}: cannot be made ({error.strerror})") from error
 
+    from hdsim.scenario.doubts import doubts
     from hdsim.simulation.simulate import simulate_to_log
 
+    for doubt in doubts(loaded):
+        click.echo(f"{scenario}: warning: {doubt}", err=True)
     session = None
     if live:
         from hdsim.live.session import LiveRun
@@ -83,7 +86,7 @@ def run(
     if done.failure:
         click.echo(f"error: the run stopped early: {done.failure}", err=True)
         return 1
-    return 0
+    return 1 if done.audit.gave_back else 0
 
 
 def tell(run: Run, duration_s: float) -> None:

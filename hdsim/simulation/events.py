@@ -148,16 +148,15 @@ class EventDetector:
                 rated * margin,
             )
         ]
-        momentary = momentary_torque(self.model)
-        if momentary is not None:
+        for name, limit in catalogue_limits(self.model).items():
             self._output.append(
                 Watch(
                     "drive",
                     "error",
-                    f"momentary peak torque of {momentary:.4g} N m exceeded",
-                    "torque below the momentary peak again",
-                    momentary,
-                    momentary * margin,
+                    f"{name} of {limit:.4g} N m exceeded",
+                    f"torque below the {name.split(',')[0]} again",
+                    limit,
+                    limit * margin,
                 )
             )
         self._flanks = Flanks(UNLOADED * rated)
@@ -313,18 +312,22 @@ class EventDetector:
         return told
 
 
-def momentary_torque(model: Model) -> float | None:
-    """Momentary peak torque that the maker allows, N m; None where the drive is no catalogue size."""
+def catalogue_limits(model: Model) -> dict[str, float]:
+    """Torques that a catalogue drive survives once, or not (the teeth skip), N m; none for other drives."""
     from hdsim.drive.presets import catalogue_figures
     from hdsim.errors import HdsimError
 
     if model.drive.preset is None:
-        return None
+        return {}
     try:
-        figure = catalogue_figures(model.drive.preset).momentary_peak_torque
+        figures = catalogue_figures(model.drive.preset)
     except (HdsimError, KeyError, ValueError):
-        return None
-    return None if figure is None else figure.value
+        return {}
+    found = {
+        "momentary peak torque": figures.momentary_peak_torque,
+        "ratcheting torque, at which teeth skip in a real drive and never here,": figures.ratcheting_torque,
+    }
+    return {name: figure.value for name, figure in found.items() if figure is not None}
 
 
 def torque_limit(model: Model) -> float:

@@ -59,7 +59,7 @@ class Plant:
     """
 
     def __init__(self, scenario: Scenario, outputs: tuple[str, ...] | None = None) -> None:
-        drive = scenario.drive
+        drive = scenario.drive.resolved()
         self.model = Model(
             drive,
             plant_parts(scenario),
@@ -205,19 +205,23 @@ class Plant:
         torsion, meshing = s[a.S_TWIST_1 + 2], s[a.S_MESH_1 + 2]
         row = torsion * full[TWIST_TORQUE, self._kept] + meshing * full[MESH_TORQUE, self._kept]
         _, _, _, _, by_mo, by_oo = s[a.S_ERROR : a.S_ERROR + 6]
-        # How the levers bend with the kinematic error: as in the assembly, by the arrangement's gain.
-        if self.model.has_ring:
+        # How the levers bend with the kinematic error, as in the assembly: by the arrangement's gain.
+        if self.system.integers[a.RING] != a.RING_ABSENT:
             bent = outputs[MESH_TORQUE] * self.system.reals[a.GAIN]
         else:
             bent = outputs[TWIST_TORQUE] + outputs[MESH_TORQUE]
         hessian = s[a.S_MESH + _mesh_layout.HESSIAN : a.S_MESH + _mesh_layout.HESSIAN + 6]
         row[[0, 2, 4]] -= hessian[[2, 4, 5]]
-        row[0] += bent * by_mo
-        row[4] += bent * by_oo
+        # And with a ring in balance, which moves with both.
+        moved = outputs[TWIST_TORQUE] - outputs[MESH_TORQUE]
+        bent_mo = bent * by_mo + moved * s[a.S_RING_2 + 1]
+        bent_oo = bent * by_oo + moved * s[a.S_RING_2 + 2]
+        row[0] += bent_mo
+        row[4] += bent_oo
         housing = int(self.system.integers[a.HOUSING])
         if housing:
             # The mesh sees the angles from there.
-            row[6 + housing - OWN] += hessian[[2, 4, 5]].sum() - bent * (by_mo + by_oo)
+            row[6 + housing - OWN] += hessian[[2, 4, 5]].sum() - bent_mo - bent_oo
         return np.asarray(row)
 
 

@@ -28,6 +28,7 @@ run:
 UNSTABLE = """
 drive:
   preset: seed-2021
+  friction: {smoothing_velocity_rad_per_s: 0.5}
 command:
   motor:
     type: position

@@ -107,7 +107,7 @@ class FakeBuilder:
     def twist(self, kernel: Kernel, parameters: Any) -> None:
         self.twists.append((kernel, [float(p) for p in parameters]))
 
-    def series_compliance(self, wind_up: Callable[[Any], Any]) -> None:
+    def series_compliance(self, wind_up: Callable[[Any], Any], *, play: bool = False) -> None:
         self.compliances.append(wind_up)
 
     def widen_gap(self, half_gap_rad: float) -> None:

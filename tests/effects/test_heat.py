@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import types
 import typing
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,10 @@ from hdsim.effects import catalogue
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.thermal_friction import ThermalFriction
 from hdsim.kernel import DISSIPATED, MOTOR_TORQUE, MOTOR_VELOCITY, element
+from hdsim.log import verify_log
 from hdsim.parts import Builder, Parameters, Part
 from hdsim.simulation.run import Run
+from hdsim.simulation.simulate import summary
 
 #: Size up to which a number without an upper bound is drawn, and down to which all are.
 LARGEST, SMALLEST = 1e6, 1e-9
@@ -107,6 +110,23 @@ def test_no_legal_numbers_let_an_effect_give_energy_back(name: str, seed: int) -
     assert min(heats.values()) >= -1e-12 * model.powers(inputs), effect
 
 
+COMBINED = [name for name in catalogue() if name not in ("table", "sensors")]
+
+
+@pytest.mark.parametrize("block", range(10))
+def test_no_legal_combination_of_effects_gives_energy_back(block: int) -> None:
+    """1,000 draws: two to six effects with any legal numbers, in any state, over any legal friction."""
+    rng = np.random.default_rng([15, block])
+    for _ in range(100):
+        names = rng.choice(COMBINED, int(rng.integers(2, 7)), replace=False)
+        effects = {str(name): anything(catalogue()[str(name)], rng) for name in names}
+        model = Model(DriveFriction(friction=anything(Friction, rng)), *effects.values())
+        for _ in range(5):
+            inputs = states_of(rng, model)
+            heats = model.heats(inputs)
+            assert min(heats.values()) >= -1e-12 * model.powers(inputs), effects
+
+
 def test_thermal_friction_changes_as_much_as_the_shaft_has_however_much_is_asked() -> None:
     # The numbers with which a free motor ran away.
     asked = ThermalFriction(viscous_nm_s_per_rad=8e-4, coulomb_nm=5.0, ambient_degc=60)
@@ -170,6 +190,19 @@ def test_the_audit_refuses_heat_below_zero_though_the_balance_closes_and_other_p
     told = [event for event in run.events if event.level == "error"]
     assert len(told) == 1
     assert "pushing" in told[0].message
+
+
+@pytest.mark.parametrize("parts", [(), (Pushing(),)], ids=["sound", "pushing"])
+def test_verify_refuses_a_log_with_energy_from_nothing(parts: tuple[Part, ...], tmp_path: Path) -> None:
+    run = free_motor(*parts)
+    recording = run.record()
+    recording.metadata.update(summary(run, 0.0))
+    recording.save(tmp_path / "run.mcap")
+    problems = verify_log(tmp_path / "run.mcap").problems
+    assert [problem for problem in problems if "energy from nothing" in problem and "pushing" in problem] == (
+        problems if parts else []
+    )
+    assert bool(problems) == bool(parts), problems
 
 
 @pytest.mark.parametrize("mesh", ["rigid", "lumped"])

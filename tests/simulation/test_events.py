@@ -66,6 +66,14 @@ def test_rated_and_momentary_torque_are_told_of_a_catalogue_drive():
     assert abs(np.interp(at, recording.time, recording["output_torque"])) == pytest.approx(rated, rel=5e-3)
 
 
+def test_a_torque_at_which_teeth_skip_is_told():
+    run = build_run(scenario(torque={"type": "triangle", "amplitude_nm": 2000, "frequency_hz": 1}))
+    told = [e for e in run.record().events if e.source == "drive" and "ratcheting torque" in e.message]
+    assert told
+    assert told[0].level == "error"
+    assert "330 N m exceeded" in told[0].message
+
+
 def test_moves_and_rests_of_the_command_are_told():
     run = build_run(hdsim.load_scenario(SCENARIOS / "seed_move.yaml"))
     events = [e for e in run.record().events if e.source == "command"]

@@ -13,7 +13,7 @@ from hdsim.errors import InputError
 from hdsim.plot import style
 from hdsim.study.bench._figure import SHADES, page, zero_lines
 from hdsim.study.bench._scenario import bench
-from hdsim.study.metrics.friction import TURNING, back_driving_torque, operating_points, starting_torque
+from hdsim.study.metrics.friction import back_driving_torque, operating_points, starting_torque, turning_speed
 from hdsim.study.registry import BenchRun, Procedure, procedure
 
 if TYPE_CHECKING:
@@ -212,7 +212,7 @@ def plot_starting(runs: Sequence[BenchRun]) -> Figure:
         )
         above.set(ylabel=unit, title=f"Torque on the {side}")
         speed = np.abs(recording["motor_velocity"])
-        limit = TURNING * scenario.drive.friction.smoothing_velocity_rad_per_s
+        limit = turning_speed(scenario)
         below.plot(recording.time, speed, color=style.BLUE)
         below.axhline(limit, color=style.GREY, linestyle=":", label="counts as turning")
         below.set(ylabel="rad/s", xlabel="time (s)", ylim=(0.0, 8.0 * limit), title="Motor speed")

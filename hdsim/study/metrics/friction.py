@@ -19,10 +19,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Speed beyond which a shaft counts as turning, as a multiple of the friction's smoothing speed.
-TURNING = 6.0
+#: Speed beyond which a motor shaft counts as turning: 0.01 rad/s, and as a multiple of the smoothing speed of
+#: its friction's sign.
+_TURNING_RAD_PER_S, _TURNING = 0.01, 6.0
 
 _MANUAL = "Harmonic Drive AG, engineering data: no-load starting, back-driving and running torque, efficiency"
+
+
+def turning_speed(scenario: Scenario) -> float:
+    """Motor speed beyond which the shaft counts as turning, rad/s."""
+    return max(_TURNING_RAD_PER_S, _TURNING * scenario.drive.friction.smoothing_velocity_rad_per_s)
 
 
 def _starts(recording: Recording, scenario: Scenario) -> int:
@@ -31,7 +37,7 @@ def _starts(recording: Recording, scenario: Scenario) -> int:
     Raises:
         InputError: it does not turn, or it turns from the beginning.
     """
-    threshold = TURNING * scenario.drive.friction.smoothing_velocity_rad_per_s
+    threshold = turning_speed(scenario)
     turning = np.flatnonzero(np.abs(recording["motor_velocity"]) > threshold)
     if not len(turning):
         raise InputError(f"the drive does not start to turn: the motor stays below {threshold:.3g} rad/s")
