@@ -158,7 +158,8 @@ def borne_out(time: Array, values: Array, chosen: BSpline, rate: Array, trusted:
         read = _filtered(spline(time, nu=1), delay, order)
         columns = np.column_stack([read, np.ones(len(time))])[trusted]
         ours, *_ = np.linalg.lstsq(columns, rate[trusted], rcond=None)
-        return np.bincount(stretch, (rate[trusted] - columns @ ours) ** 2, STRETCHES) + 1e-300
+        power = np.bincount(stretch, (rate[trusted] - columns @ ours) ** 2, STRETCHES)
+        return np.asarray(power + 1e-300, dtype=float)
 
     best, least = chosen, np.inf
     for spacing in SPACINGS:
