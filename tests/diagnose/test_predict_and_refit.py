@@ -16,7 +16,7 @@ from hdsim.estimate.fit import base_intervals, fit
 from hdsim.estimate.numbers import Free, base_freedoms
 from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
-from hdsim.estimate.refit import refit, tie, with_delays
+from hdsim.estimate.refit import refit, tie, together, with_delays
 from hdsim.estimate.spline import smoothed
 from hdsim.estimate.state import Added, state_of
 from hdsim.estimate.suspect import delays
@@ -257,3 +257,36 @@ def test_lead_in_lets_the_models_own_oscillation_die_away(tmp_path):
     assert np.std((error - wind_up)[late]) < 0.05 * np.std(wind_up[late])
     # The swing begins with a step of acceleration, which at most doubles the wind-up.
     assert np.max(np.abs(error)) < 2.1 * np.max(np.abs(wind_up))
+
+
+def test_the_last_fit_holds_no_number_that_is_tied_to_another(tmp_path):
+    # Rotor and load of a rigid drive show as one inertia, which is twice the model's: only their sum is seen.
+    model = scenario(tmp_path)
+    record = rigid_record(inertia=1.93e-5 + 2 * (5e-5 + 0.50002 / 1e4))
+    bench = Bench(predictors([record], model.drive.ratio))
+    found = together(bench, refit(bench, state_of(model)).fit)
+    names = [free.name for free in found.frees]
+    rotor, load = (names.index(name) for name in ("drive.inertia.motor_kg_m2", "load.inertia_kg_m2"))
+    parts = {k: found.frees[k].at(float(found.theta[k])) for k in (rotor, load)}
+    parts[load] /= 1e4
+    assert sum(parts.values()) == pytest.approx(2 * 1e-4, rel=0.01)
+    # Along the ridge a d(ln a) = -b d(ln b), priors of 0.5: ln a has spread 0.5 / sqrt(1 + (a / b)^2),
+    # by up to 3.18 / 2 more where only four blocks of time tell (Student's t).
+    for one, other in ((rotor, load), (load, rotor)):
+        ridge = 0.5 / math.hypot(1.0, parts[one] / parts[other])
+        assert 0.95 * ridge < math.sqrt(found.covariance[one, one]) < 1.65 * ridge
+
+
+def test_a_number_known_no_better_than_before_is_not_determined(tmp_path):
+    model = scenario(tmp_path)
+    bench = Bench(predictors([rigid_record()], model.drive.ratio))
+    base = refit(bench, state_of(model))
+    found = base.fit
+    k = [free.name for free in found.frees].index("drive.friction.coulomb_nm")
+    assert base_intervals(found, base.freedoms)[k].determined
+    vague = found.covariance.copy()
+    vague[k, k] = (1.01 * found.frees[k].prior) ** 2
+    one = base_intervals(replace(found, covariance=vague), base.freedoms)[k]
+    assert not one.determined
+    assert math.isnan(one.low)
+    assert not one.moved
