@@ -31,7 +31,7 @@ def _unread_sensors(scenario: Scenario) -> list[str]:
         return []
     return [
         f"effects.sensors: found {', '.join(given)} beside a continuous controller, which reads the true "
-        "motion: they only show in the log; set command.motor.sample_period_s for a controller that reads them"
+        "motion: they only show in the log; set command.motor.sample_period_s for one that reads them"
     ]
 
 
