@@ -92,9 +92,8 @@ def to_markdown(rows: list[Row], figures: dict[str, str]) -> str:
         lines += ["| source | statement | paper | hdsim | verdict | reason | corrected | chosen |"]
         lines.append("|" + "---|" * 8)
         for r in members:
-            cells = (r.source, r.statement, r.paper, r.computed, f"**{r.verdict}**", r.reason, r.correction)
-            chosen = "; ".join(f"{what}; {other}" for what, other in r.choices.items())
-            cells = (*cells, chosen)
+            cells = [r.source, r.statement, r.paper, r.computed, f"**{r.verdict}**", r.reason, r.correction]
+            cells.append("; ".join(f"{what}; {other}" for what, other in r.choices.items()))
             lines.append("| " + " | ".join(c if i == 4 else cell(c) for i, c in enumerate(cells)) + " |")
     for file, caption in figures.items():
         lines += ["", f"![{caption}]({file})", "", f"*{caption}*"]
