@@ -191,6 +191,7 @@ class Effect(Part):
         number: what its numbers say to a fit where a field's annotation (``hdsim.number``) says nothing else:
             a source's number is often another machine's.
         several: whether its fittings are errors of different things, one beside the other.
+        adds_to: its fields that come on top of a number of the drive, by that number's path in the drive.
     """
 
     title: ClassVar[str]
@@ -198,3 +199,4 @@ class Effect(Part):
     signature: ClassVar[Signature]
     number: ClassVar[Number] = Number(0.7, far=15.0, may_vanish=True)
     several: ClassVar[bool] = False
+    adds_to: ClassVar[tuple[tuple[str, str], ...]] = ()

@@ -34,6 +34,7 @@ class InputCoulombViscous(Effect):
             "the input",
         },
     )
+    adds_to: ClassVar[tuple[tuple[str, str], ...]] = (("coulomb_nm", "friction.coulomb_nm"),)
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Amplitude({"coulomb_nm": 0.032}), Amplitude({"viscous_nm_s_per_rad": 3.5e-4})),

@@ -78,6 +78,7 @@ class LugreFriction(Effect):
             "output_backlash": "the free play there carries no torque at all, the presliding zone a spring's",
         },
     )
+    adds_to: ClassVar[tuple[tuple[str, str], ...]] = (("coulomb_nm", "friction.coulomb_nm"),)
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Amplitude({"coulomb_nm": 0.02, "static_nm": 0.0201}), Amplitude({"static_nm": 0.02})),

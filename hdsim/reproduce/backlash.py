@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from hdsim.reproduce import paper
 from hdsim.reproduce.rows import Row, Verdict, check
 from hdsim.surface.backlash import single_frequency_half_gap, tooth_half_gaps
 from hdsim.surface.flank import Flank, equivalent_surface
-from hdsim.surface.profile import HIGHEST_INDEX, SAMPLING_LENGTH_M
+from hdsim.surface.profile import HIGHEST_INDEX, SAMPLING_LENGTH_M, random_phases, wm_profile
 
 DRAWS = 2000
 
@@ -58,26 +59,57 @@ def table_4() -> Iterator[Row]:
             f"average backlash, D = {D:g}, G = {G:g} m",
             length(printed),
             f"{length(mean)}, {100 * error:+.1f} % {draw}",
-            Verdict.REPRODUCED if abs(error) < 0.07 else Verdict.CONTRADICTED,
+            Verdict.CHOICE if abs(error) < 0.07 else Verdict.CONTRADICTED,
             f"mean |z| over 0..L of the full sum, L = {SAMPLING_LENGTH_M * 1e3:.1f} mm, {HIGHEST_INDEX + 1} "
             f"frequencies, {DRAWS} phase draws; the paper states neither L nor the averaging, and prints one "
             "frequency only",
             "b = mean |z|, with the sum over all n in Eq. 15",
             values | {"relative_error": error},
+            _choices(Flank(D, G), printed, single),
         )
+
+
+def _choices(flank: Flank, printed: float, single: float) -> dict[str, str]:
+    """What was chosen for Table 4, and a cell at other values."""
+
+    def cell(**other: Any) -> str:
+        value = float(tooth_half_gaps(flank, 200, 1, **other).mean())
+        return f"{100 * (value / printed - 1):+.0f} %"
+
+    rms = float(tooth_rms(flank) / printed - 1)
+    return {
+        f"sampling length L = {SAMPLING_LENGTH_M * 1e3:.1f} mm": f"1 mm {cell(length_m=1e-3)}, "
+        f"4 mm (the scan) {cell(length_m=4e-3)}",
+        f"frequencies up to n_max = {HIGHEST_INDEX}": f"10 {cell(highest_index=10)}, "
+        f"15 {cell(highest_index=15)}",
+        "b = mean of |z|": f"rms of z {100 * rms:+.0f} %",
+        "sum over all n": f"one frequency, as printed, with 2r' = 1 mm {100 * (single / printed - 1):+.0f} %",
+    }
+
+
+def tooth_rms(flank: Flank) -> float:
+    """Root mean square of z over 0..L, averaged over phase draws, m."""
+    phases = random_phases(200, 1, HIGHEST_INDEX)
+    x = (np.arange(256) + 0.5) * (SAMPLING_LENGTH_M / 256)
+    z = wm_profile(x, flank.D, flank.G_m, phases=phases, length_m=SAMPLING_LENGTH_M)
+    return float(np.sqrt((z**2).mean(axis=-1)).mean())
 
 
 def _trend(flanks: list[Flank]) -> list[float]:
     return [float(averages(f.D, f.G_m).mean()) for f in flanks]
 
 
+_OVER_D = [Flank(D, 1e-12) for D in (2.2, 2.4, 2.6, 2.8)]
+_OVER_G = [Flank(2.3, G) for G in (1e-15, 1e-13, 1e-11, 1e-9)]
+
+
 @check("fig-8", "fig-9")
 def figures() -> Iterator[Row]:
     """Backlash falls with D, rises with G."""
-    over_D = _trend([Flank(D, 1e-12) for D in (2.2, 2.4, 2.6, 2.8)])
-    over_G = _trend([Flank(2.3, G) for G in (1e-15, 1e-13, 1e-11, 1e-9)])
+    over_D, over_G = _trend(_OVER_D), _trend(_OVER_G)
     for name, label, values, falling in (("fig-8", "D", over_D, True), ("fig-9", "G", over_G, False)):
-        monotone = bool((np.diff(values) < 0).all() if falling else (np.diff(values) > 0).all())
+        waves = [single_frequency_half_gap(f) for f in (_OVER_D if falling else _OVER_G)]
+        monotone = all((np.diff(v) < 0).all() if falling else (np.diff(v) > 0).all() for v in (values, waves))
         verb = "falls" if falling else "rises"
         yield Row(
             name,
@@ -86,7 +118,8 @@ def figures() -> Iterator[Row]:
             f"{verb}",
             f"{', '.join(length(v) for v in values)}",
             Verdict.REPRODUCED if monotone else Verdict.CONTRADICTED,
-            "the curves themselves hang on phases that the paper doesn't give; trend and size are reproduced",
+            "the trend holds for the mean of the full sum and for one frequency, at any L; the curves "
+            "themselves hang on phases that the paper doesn't give",
             values={f"mean_m_{i}": v for i, v in enumerate(values)},
         )
 
@@ -100,31 +133,53 @@ def micron_rules() -> Iterator[Row]:
     yield Row(
         "rule-D",
         "Section 4.1",
-        "D about 2.5 is needed for micron-level backlash",
+        "to ensure micron-level backlash, D should be about 2.5",
         "D about 2.5",
         f"at G = 1e-12 m: {length(at_2_4)} at D = 2.4, {length(at_2_5)} at D = 2.5",
-        Verdict.CONTRADICTED if at_2_4 < 1e-6 else Verdict.REPRODUCED,
-        "the paper's own row D = 2.4 (0.32 um) is below a micron already; which D gives a micron depends "
-        "on G",
+        Verdict.CHOICE if at_2_5 < _MICRON_LEVEL_M else Verdict.CONTRADICTED,
+        "enough, as the paper says, but not needed: its own row D = 2.4 is below a micron already, and which "
+        "D gives a micron depends on G",
         f"D = {micron:.2f} gives 1 um at G = 1e-12 m",
         {"at_2_4_m": at_2_4, "at_2_5_m": at_2_5, "D_of_one_micron": micron},
+        {
+            "G = 1e-12 m, that of the paper's rows over D": f"{length(_mean(2.5, 1e-9))} at G = 1e-9 m",
+            "micron level: below 2 um": f"below 0.1 um it {'holds' if at_2_5 < 1e-7 else 'does not hold'}",
+        },
     )
     pair = float(averages(paper.AVERAGED.D, paper.AVERAGED.G_m).mean())
     summed = equivalent_surface(paper.CIRCULAR_SPLINE, paper.FLEXSPLINE)
     both = float(averages(summed.D, summed.G_m).mean())
     arcsec = math.degrees(pair / (paper.PITCH_DIAMETER_M / 2)) * 3600
+    at_rule = _mean(2.3, 1e-13)
     yield Row(
         "rule-G",
         "Section 4.1",
-        "G below 1e-13 m is needed for micron-level backlash",
+        "to ensure micron-level backlash, G should be below 1e-13 m",
         "G < 1e-13 m",
-        f"measured pair (G = 1.55e-10 m): {length(pair)} = {arcsec:.1f} arcsec; summed {length(both)}",
-        Verdict.CONTRADICTED if pair < 1e-6 else Verdict.REPRODUCED,
-        "the paper's own measured surface has a G a thousand times larger and a backlash below a micron; "
-        "the rule "
-        "holds at D = 2.3 only",
-        values={"averaged_pair_m": pair, "summed_pair_m": both, "averaged_pair_arcsec": arcsec},
+        f"at D = 2.3: {length(at_rule)} at G = 1e-13 m; measured pair (G = 1.55e-10 m): {length(pair)} = "
+        f"{arcsec:.1f} arcsec; summed {length(both)}",
+        Verdict.CHOICE if at_rule < _MICRON_LEVEL_M else Verdict.CONTRADICTED,
+        "enough at the D of the paper's rows over G, but not needed: its own measured surface has a G a "
+        "thousand times larger and a backlash below a micron",
+        values={
+            "at_rule_m": at_rule,
+            "averaged_pair_m": pair,
+            "summed_pair_m": both,
+            "averaged_pair_arcsec": arcsec,
+        },
+        choices={
+            "D = 2.3, that of the paper's rows over G": f"{length(_mean(2.2, 1e-13))} at D = 2.2",
+            "micron level: below 2 um": f"below 1 um it {'holds' if at_rule < 1e-6 else 'does not hold'}",
+        },
     )
+
+
+#: What section 4.1 is taken to mean by the micron level, m.
+_MICRON_LEVEL_M = 2e-6
+
+
+def _mean(D: float, G_m: float) -> float:
+    return float(averages(D, G_m).mean())
 
 
 def _micron_D(G_m: float) -> float:

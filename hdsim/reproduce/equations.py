@@ -209,7 +209,8 @@ def loads() -> Iterator[Row]:
         "stiffness of one asperity",
         "(df/da')/(ddelta/da')",
         f"algebra right ({slope:.0e} from numerical derivatives); {times:.2f} times Hertz at D = 2.5",
-        Verdict.CONTRADICTED if abs(times - 1.0) > 0.01 else Verdict.REPRODUCED,
+        Verdict.REPRODUCED if slope < 1e-6 else Verdict.CONTRADICTED,
+        "a criticism of the model, not of the print: "
         "the derivative runs along the asperity's size; loading one asperity of fixed R gives Hertz's 3/2 in "
         "place of (4-D)/(3-D), which diverges as D tends to 3",
         "k = 2 E sqrt(R delta) = E sqrt(2 a'/pi)",
@@ -224,7 +225,8 @@ def loads() -> Iterator[Row]:
         "no stiffness while every asperity is plastic",
         "K = 0 for a_l < a_c",
         f"K = {zero:g} N/m as printed; at D = 2.3 that is every force below {limit:.3g} N",
-        Verdict.CONTRADICTED if zero == 0.0 and limit > 0.0 else Verdict.REPRODUCED,
+        Verdict.REPRODUCED if zero == 0.0 else Verdict.CONTRADICTED,
+        "follows from Eq. 12, and is a criticism of the model: "
         "unloading is elastic, so K = 0 is an artefact; it also makes the penetration, the integral of dF/K, "
         "infinite. (The text's 'only in the plastic stage' must read elastic.)",
         "K(F) = max(K_MB(F), K_MB(F_floor)), with the bulk in series",

@@ -14,7 +14,12 @@ from hdsim.reproduce.rows import Row, Verdict
 if TYPE_CHECKING:
     from rich.console import Console
 
-_STYLE = {Verdict.REPRODUCED: "green", Verdict.CONTRADICTED: "red", Verdict.OPEN: "yellow"}
+_STYLE = {
+    Verdict.REPRODUCED: "green",
+    Verdict.CHOICE: "cyan",
+    Verdict.CONTRADICTED: "red",
+    Verdict.OPEN: "yellow",
+}
 
 #: Longer lines are hard to read.
 _WIDEST = 120
@@ -46,6 +51,7 @@ def print_rows(rows: list[Row], console: Console | None = None) -> None:
         for name, text in (
             ("", row.statement), ("paper", row.paper), ("hdsim", row.computed), ("why", row.reason),
             ("corrected", row.correction),
+            *(("chosen", f"{what}; {other}") for what, other in row.choices.items()),
         ):  # fmt: skip
             if text:
                 first = f"  {name:<11}" if name else "  "
@@ -83,9 +89,11 @@ def to_markdown(rows: list[Row], figures: dict[str, str]) -> str:
     lines += [f"{summary(rows)}.", "", *(f"* {cell(sentence)}" for sentence in headlines(rows)), "", TONE]
     for title, about, members in sections(rows):
         lines += ["", f"## {title}", "", *([about, ""] if about else [])]
-        lines += ["| source | statement | paper | hdsim | verdict | reason | corrected |", "|" + "---|" * 7]
+        lines += ["| source | statement | paper | hdsim | verdict | reason | corrected | chosen |"]
+        lines.append("|" + "---|" * 8)
         for r in members:
-            cells = (r.source, r.statement, r.paper, r.computed, f"**{r.verdict}**", r.reason, r.correction)
+            cells = [r.source, r.statement, r.paper, r.computed, f"**{r.verdict}**", r.reason, r.correction]
+            cells.append("; ".join(f"{what}; {other}" for what, other in r.choices.items()))
             lines.append("| " + " | ".join(c if i == 4 else cell(c) for i, c in enumerate(cells)) + " |")
     for file, caption in figures.items():
         lines += ["", f"![{caption}]({file})", "", f"*{caption}*"]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hdsim.scenario.model import Scenario
-
-#: Effects that bring a Coulomb friction of the motor shaft on top of the drive's own.
-_MORE_FRICTION = ("input_coulomb_viscous", "lugre_friction")
 
 
 def doubts(scenario: Scenario) -> list[str]:
@@ -31,7 +29,7 @@ def _unread_sensors(scenario: Scenario) -> list[str]:
         return []
     return [
         f"effects.sensors: found {', '.join(given)} beside a continuous controller, which reads the true "
-        "motion: they only show in the log; set command.motor.sample_period_s for a controller that reads them"
+        "motion: they only show in the log; set command.motor.sample_period_s for one that reads them"
     ]
 
 
@@ -54,15 +52,14 @@ def _coarse_windows(scenario: Scenario) -> list[str]:
 
 
 def _double_friction(scenario: Scenario) -> list[str]:
-    """Effects of the motor shaft's friction add to the drive's, which a preset brings."""
-    own = scenario.drive.friction.coulomb_nm
+    """Effects whose numbers add to the drive's, which a preset brings."""
     found = []
-    for name in _MORE_FRICTION:
-        effect = scenario.effects.active().get(name)
-        more = getattr(effect, "coulomb_nm", 0.0)
-        if own > 0 and more > 0:
-            found.append(
-                f"effects.{name}.coulomb_nm: found {more:.4g} N m on top of the {own:.4g} N m of "
-                "drive.friction.coulomb_nm, which counts too; set that to 0 where the effect is all there is"
-            )
+    for name, effect in scenario.effects.active().items():
+        for field, path in effect.adds_to:
+            own, more = attrgetter(path)(scenario.drive), getattr(effect, field)
+            if own > 0 and more > 0:
+                found.append(
+                    f"effects.{name}.{field}: found {more:.4g} on top of the {own:.4g} of drive.{path}, "
+                    "which counts too; set that to 0 where the effect is all there is"
+                )
     return found

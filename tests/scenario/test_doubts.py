@@ -56,7 +56,7 @@ def test_a_speed_window_within_a_sample() -> None:
 @pytest.mark.parametrize("name", ["input_coulomb_viscous", "lugre_friction"])
 def test_friction_that_counts_twice(name: str) -> None:
     (line,) = told({name: {}})
-    assert line.startswith(f"effects.{name}.coulomb_nm: found 0.032 N m on top of the 0.0")
+    assert line.startswith(f"effects.{name}.coulomb_nm: found 0.032 on top of the 0.0")
     assert told({name: {}}, drive={"preset": "csg-20-100", "friction": {"coulomb_nm": 0.0}}) == []
 
 
