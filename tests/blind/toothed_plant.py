@@ -22,6 +22,9 @@ STANDING_S = 0.5
 #: Rates that a plant's motion is told at, that a prescribed one is, and its log's at the least, Hz.
 TOLD_HZ, LIKE_HZ, LOG_HZ = 100, 250, 1000
 
+#: Friction's sign as a prediction has it: how a drive sticks is not what is hidden here.
+SIGN = {"smoothing_velocity_rad_per_s": 0.5}
+
 Effects = dict[str, dict[str, Any]]
 
 
@@ -126,14 +129,14 @@ def simulate(
     if like is not None:
         motor = {"type": "motion", "trajectory": column | {"file": "like.csv", "value_column": "angle"}}
     changes: dict[str, Any] = {
-        "extends": "base.yaml", "drive": {}, "effects": effects, "command": {"motor": motor},
+        "extends": "base.yaml", "drive": {"friction": SIGN}, "effects": effects, "command": {"motor": motor},
         "load": {"torque": column | {"file": "told.csv", "value_column": "load"}},
         "run": {"duration_s": seconds, "sample_rate_hz": float(sampled), "teeth_rate_hz": 0.0},
     }  # fmt: skip
     if like is None:
         changes["run"]["start"] = {"motor_angle_rad": float(given.angle[0]) * d.ratio}
     if teeth is not None:
-        changes["drive"] = {"mesh": teeth.section(d), "geometry": {"pitch_radius_m": radius},
+        changes["drive"] |= {"mesh": teeth.section(d), "geometry": {"pitch_radius_m": radius},
                             "inertia": {"ring_kg_m2": ring}}  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         _table(Path(folder) / "told.csv", TOLD_HZ, {"angle": given.angle, "load": given.load})
