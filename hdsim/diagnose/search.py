@@ -103,6 +103,9 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
             # Beside a name that was needless others may have been wrong.
             found.fit = together(bench, _again(bench, base, found.fit, found, tell, every=True))
             found.fit = revised(bench, found.fit, found.named, tell)
+        for one in found.named:
+            for other in found.named:
+                one.group.pop(other.name, None)  # what is there by itself is no other name of this
         # What is left is what this fit leaves, not the rough one before it.
         found.left = left_of(bench, found.fit)
         last = found.stages[-1]
