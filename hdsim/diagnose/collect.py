@@ -52,7 +52,7 @@ def collect(
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
         laws=[
-            _law(one, added, found.stages)
+            _law(one, added, found.stages, explained if len(found.named) == 1 else one.worth)
             for one, added in zip(found.named, found.fit.state.added, strict=True)
         ],
         explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
@@ -87,8 +87,8 @@ def _stage(stage: Stage) -> StageEvidence:
     )
 
 
-def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
-    first, last = (_own(added, stage.location) for stage in (stages[0], stages[-1]))
+def _law(one: Named, added: Added, stages: Sequence[Stage], worth: float) -> LawEvidence:
+    own = max(_own(added, stages[-1].location), 0.0)
     return LawEvidence(
         name=one.name,
         group=list(one.group),
@@ -97,7 +97,7 @@ def _law(one: Named, added: Added, stages: Sequence[Stage]) -> LawEvidence:
         gain=one.gain,
         # Sharp lines are no part of what smooth effects have left.
         needed=max(one.needed, one.of_lines) if added.lives_in[0] == SHARP else one.needed,
-        own_left=float(np.clip(last / first, 0.0, 1.0)) if first > 0 else 0.0,
+        own_left=own / max(own + max(worth, 0.0), 1e-300),
         own_first=_own_first(added, stages[-1].location),
         exact=catalogue()[one.name].signature.exact,
         at_limit=added.at_limit,

@@ -77,7 +77,7 @@ class LawEvidence(Part):
     """Part of what would be missing without it that it explains, all others fitted anew, in the channel where
     that is most."""
     own_left: float = 0.0
-    """Structure left in its own coordinate, as a part of what was there at first."""
+    """Structure left in its own coordinate, as a part of that and of what it explains."""
     own_first: bool = True
     """Whether its own coordinate tells more than any other of what is left where it acts."""
     exact: bool = False

@@ -65,6 +65,7 @@ class Named:
         of_lines: part of the sharp lines that were left that it explained, where it lives there; likewise.
         gain: part of the first pass's structure that it explained; set by the search.
         needed: part of what would be missing without it that it explains, beside all others; likewise.
+        worth: power that it explains beside all others; likewise, where there are others.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Named:
     of_left: float = 1.0
     of_lines: float = 0.0
     needed: float = 1.0
+    worth: float = 0.0
 
 
 def name_effect(

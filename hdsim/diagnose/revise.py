@@ -27,7 +27,7 @@ NEEDLESS = 0.1
 
 
 def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str], object]) -> Fit:
-    """The model without needless names; ``needed`` of the others is set.
+    """The model without needless names; ``needed`` and ``worth`` of the others are set.
 
     Args:
         bench: the measured series.
@@ -39,8 +39,12 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
         others: list[Fit | None] = []
         for k, one in enumerate(named):
             tell(f"without {one.name}")
-            others.append(_without(bench, current, k, rough=len(named) == 2))
-            one.needed = needed(bench, others[-1], current) if others[-1] is not None else 1.0
+            rest = _without(bench, current, k, rough=len(named) == 2)
+            one.needed, one.worth = 1.0, math.inf
+            if rest is not None:
+                one.needed = needed(bench, rest, current)
+                one.worth = bench.power(rest.predictions) - bench.power(current.predictions)
+            others.append(rest)
         k = min(range(len(named)), key=lambda k: named[k].needed)
         without = others[k]
         if without is None or named[k].needed >= NEEDLESS:

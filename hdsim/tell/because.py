@@ -42,7 +42,7 @@ WORDINGS = {
         "one of its numbers stands at the end of its range", lambda _: "yes"
     ),
     "part of the structure in its own coordinate that it leaves": Wording(
-        "part of what lived in its own coordinate that it leaves there", _part
+        "what it leaves in its own coordinate, of that and what it explains", _part
     ),
     "one more effect": Wording("not the first: a further effect", lambda k: f"no. {k + 1:.0f}"),
     "part of what would be missing without it": Wording(
