@@ -68,10 +68,13 @@ by (down to {LEAST_NOISE:g} times the usual noise), and in the end the nearest t
 strengths in the tables are those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
-page of this version none is left out. Its statement cases were run once, on seeds that had never been looked
-at and after the last change of search and rules, all cases whose turn came in the time there was (of the
-recordings the first four). Of the calibration cases the search was a few changes older, and their verdicts
-are those that `decide` makes of the stored evidence by the final rules.
+page of this version none is left out. Its statement cases are of a seed that calibrated nothing, all cases
+whose turn came in the time there was, run after the last change of search and rules. An earlier pass over the
+first twenty-four had been seen when the measure of what a name leaves in its own coordinate was mended, for
+what calibration cases showed of it. Of the calibration cases the search was a few changes older.
+
+The cases of this page are kept in `tests/blind/results.jsonl.gz`, evidence and all: `python tests/blind page`
+writes it from them, and `decide` can judge every one again.
 
 **What is right.** A group of effects that the diagnosis calls indistinguishable counts when it holds the
 truth and at most three names; the first such group counts, of a pair both must be there. Where two names of
