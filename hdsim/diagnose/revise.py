@@ -20,8 +20,8 @@ from hdsim.estimate.fit import Fit, at_present, fit
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import together
 
-#: Least excess over a channel's noise power that counts: a fifth of the noise's root mean square (chosen: half
-#: of what the weakest effects of blind cases have).
+#: Least excess over a channel's noise power that counts: a fifth of the noise's root mean square (chosen:
+#: half of what the weakest effects of blind cases have).
 EXCESS = 0.05
 #: Part of what would be missing without it below which a name is taken back (chosen: of calibration cases
 #: right ones have 0.8 to 1, wrong ones 0.1 to 0.35 and, once, 0.9).
