@@ -54,7 +54,8 @@ schema: $(STAMP)
 blind: $(STAMP)
 	$(BIN)/python tests/blind run --families numpy,mujoco,toothed,real --numbers 0-99 --seed 1 --jobs $(WORKERS) \
 	  --results results/blind.jsonl
-	$(BIN)/python tests/blind page --results results/blind.jsonl --write docs/blind.md
+	$(BIN)/python tests/blind store --results results/blind.jsonl
+	$(BIN)/python tests/blind page
 
 picture: run
 	cp logs/seed_move.png docs/images/seed_move.png

@@ -11,12 +11,10 @@ from pathlib import Path
 
 from contract import AbsentError
 from judging import Line, outcome, said
-from running import FAMILIES, Task, attempt, family, keep, lines_of, run, store, stored, task_of
+from running import FAMILIES, KEPT, Task, attempt, family, keep, lines_of, run, store, stored, task_of
 
 #: Never used to calibrate, whatever its seeds: what is stated of it, no rule has seen.
 LEFT_OUT = "mujoco"
-#: Cases of the page, packed.
-KEPT = Path(__file__).parent / "results.jsonl.gz"
 
 
 def numbers_of(text: str) -> list[int]:
@@ -169,11 +167,13 @@ def main() -> None:
     command.add_argument("--cases", type=Path, default=None, metavar="FOLDER",
                          help="where drawn cases are kept")  # fmt: skip
     command.set_defaults(run=one)
-    for name, call, text in (
-        ("show", show, "print stored cases whose key holds the text"),
-        ("store", keep_all, "pack stored cases into the file that the page is written from"),
-        ("page", page, "write the page"),
-        ("calibrate", calibrate, "calibrate rules on stored cases of even seeds"),
+    # Of a case that stands in several files the last one counts: the newer after the kept.
+    new = Path("results/blind.jsonl")
+    for name, call, results, text in (
+        ("show", show, [KEPT, new], "print stored cases whose key holds the text"),
+        ("store", keep_all, [KEPT, new], "pack stored cases into the file that the page is written from"),
+        ("page", page, [KEPT], "write the page"),
+        ("calibrate", calibrate, [new], "calibrate rules on stored cases of even seeds"),
     ):
         command = commands.add_parser(name, help=text)
         if name == "show":
@@ -182,7 +182,7 @@ def main() -> None:
             command.add_argument(
                 "--write", type=Path, default=Path("docs/blind.md") if name == "page" else KEPT
             )
-        command.add_argument("--results", type=paths, default=[Path("results/blind.jsonl"), KEPT],
+        command.add_argument("--results", type=paths, default=results,
                              help="files, comma-separated")  # fmt: skip
         command.set_defaults(run=call)
     given = parser.parse_args()

@@ -6,11 +6,10 @@ import page
 import pytest
 from calibrate import judged_again
 from judging import groups
-from running import lines_of
+from running import KEPT, lines_of
 
 from hdsim.diagnose.rules import RULES
 
-KEPT = Path(__file__).parent / "results.jsonl.gz"
 PAGE = Path(__file__).parents[2] / "docs" / "blind.md"
 
 

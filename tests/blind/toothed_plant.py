@@ -15,6 +15,7 @@ from moving import motion
 
 import hdsim
 from hdsim.contact.law import ValidityWarning
+from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.scenario.writer import to_yaml
 
 #: Time for which the drive stands before its log begins, s.
@@ -23,7 +24,7 @@ STANDING_S = 0.5
 TOLD_HZ, LIKE_HZ, LOG_HZ = 100, 250, 1000
 
 #: Friction's sign as a prediction has it: how a drive sticks is not what is hidden here.
-SIGN = {"smoothing_velocity_rad_per_s": 0.5}
+SIGN = {"smoothing_velocity_rad_per_s": RESOLVED_RAD_PER_S}
 
 Effects = dict[str, dict[str, Any]]
 
