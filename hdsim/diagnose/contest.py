@@ -20,6 +20,7 @@ from hdsim.estimate.fit import Fit, at_present, fit
 from hdsim.estimate.numbers import scaled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
+from hdsim.estimate.refit import REACHED
 from hdsim.estimate.state import Added, State
 from hdsim.estimate.vector import Vector, sensitivities
 
@@ -30,8 +31,6 @@ ROUGH, FULL, LEFT_IN, FAR_LEFT_IN = 5, 12, 2.0, 3.0
 FAR_MOST = 3
 #: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
 FAR = 0.7
-#: What a fit may leave, in units of the noise, to count as one that has reached it.
-REACHED = 1.05
 #: Farthest that the base's numbers go with the screen's word alone, as a logarithm.
 FARTHEST = 2.0
 #: Part of the drive's compliance that the screen may give to an effect in series.

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnose.contest import REACHED, against_priors, contest
+from hdsim.diagnose.contest import against_priors, contest
 from hdsim.diagnose.evidence import CandidateEvidence
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
@@ -18,6 +18,7 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.records import Array
+from hdsim.estimate.refit import REACHED
 
 #: Least share of the weighed residual that an effect must explain to be worth a name.
 LEAST_SHARE = 0.03

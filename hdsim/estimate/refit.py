@@ -25,7 +25,7 @@ WEIGHINGS, ALIKE = 3, 1.5
 ALL = 0.1
 #: Prior spreads that a number may have gone for a fit to begin at the given one too.
 FAR = 2.0
-#: What a fit may leave, in units of the noise, to leave nothing to be found from elsewhere.
+#: What a fit may leave, in units of the noise, to count as one that has reached it.
 REACHED = 1.05
 
 

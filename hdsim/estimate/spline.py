@@ -153,25 +153,26 @@ def borne_out(time: Array, values: Array, chosen: BSpline, rate: Array, trusted:
     """
     stretch = (np.arange(len(time)) * STRETCHES // len(time))[trusted]
 
-    def missed(spline: BSpline, delay: float, order: int) -> Array:
-        """Power of the rate in each stretch that the filtered derivative does not foretell."""
-        read = _filtered(spline(time, nu=1), delay, order)
+    def missed(slope: Array, delay: float, order: int) -> Array:
+        """Power of the rate in each stretch that a derivative behind a filter does not foretell."""
+        read = _filtered(slope, delay, order)
         columns = np.column_stack([read, np.ones(len(time))])[trusted]
         ours, *_ = np.linalg.lstsq(columns, rate[trusted], rcond=None)
         left = (rate[trusted] - columns @ ours) ** 2
         return np.asarray(np.bincount(stretch, left, STRETCHES) + 1e-300, dtype=float)
 
-    best, least = chosen, np.inf
+    best, least, chosen_slope = chosen, np.inf, chosen(time, nu=1)
     for spacing in SPACINGS:
         if int((len(time) - 1) / spacing) < 4:
             break
         spline = _uniform(time, values, spacing)
         if spline is None or len(spline.c) >= len(chosen.c):
             continue
-        tried = [(missed(spline, delay, order), delay, order) for delay in DELAYS for order in (1, 2)]
+        slope = spline(time, nu=1)
+        tried = [(missed(slope, delay, order), delay, order) for delay in DELAYS for order in (1, 2)]
         now, delay, order = min(tried, key=lambda one: float(one[0].sum()))
         # Of the logarithms a hiccup of the log counts as one stretch among the others.
-        better = np.log(missed(chosen, delay, order) / now)
+        better = np.log(missed(chosen_slope, delay, order) / now)
         clear = float(better.mean()) > CLEARLY * float(better.std()) / np.sqrt(STRETCHES)
         if clear and now.sum() < least:
             best, least = spline, float(now.sum())

@@ -44,9 +44,13 @@ MATERIALS = Materials()
 
 
 def law(
-    flank: Flank, hardness_pa: float = HARDNESS_PA, asperity_stiffness: AsperityStiffness = "printed"
+    flank: Flank,
+    hardness_pa: float = HARDNESS_PA,
+    asperity_stiffness: AsperityStiffness = "printed",
+    *,
+    modulus_times: float = 1.0,
 ) -> MajumdarBhushan:
-    """The Majumdar-Bhushan law of a flank, with the default steels."""
+    """The Majumdar-Bhushan law of a flank, with the default steels or so many times their modulus."""
     import warnings
 
     from hdsim.contact.law import ValidityWarning
@@ -58,7 +62,7 @@ def law(
         return MajumdarBhushan(
             flank.D,
             flank.G_m,
-            MATERIALS.reduced_modulus_pa,
+            modulus_times * MATERIALS.reduced_modulus_pa,
             hardness_pa,
             MATERIALS.softer.poisson_ratio,
             asperity_stiffness,
