@@ -143,8 +143,6 @@ EFFECTS = (
       for order in (2.0, 4.0)),
     PutIn("wave generator once a turn", frozenset({"wave_generator_eccentricity", "kinematic_error"}),
           kinematic(1.0), lambda _: 2.0 * ARCMIN, "rad", "lara", 1.0, "amplitude_arcmin", 1.0 / ARCMIN),
-    PutIn("eccentric load encoder", frozenset({"sensors", "output_eccentricity"}), encoder,
-          lambda _: 3.0 * ARCMIN, "rad", "lara"),
     PutIn("weight on the output", frozenset({"unbalance"}), weight, lambda _: 60.0, "N m", "lara"),
 )  # fmt: skip
 

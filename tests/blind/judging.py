@@ -121,21 +121,27 @@ def stated(line: Line) -> float | None:
     return float(verdict["effects"][0]["confidence"]) if verdict.get("effects") else None
 
 
-def closed(case: Case, gap: dict[str, Any], readings: int = 1) -> float | None:
+def closed(
+    case: Case, gap: dict[str, Any], readings: int = 1, without: dict[str, Any] | None = None
+) -> float | None:
     """Share of the held-out gap after the re-fit that was closed, of what noise leaves to close.
 
     Of the channel whose gap over its best possible is largest. The best possible is what the held-out log
-    differs from ideal sensors in the plant, the channel's noise where that isn't known. ``None`` where
-    less than a tenth of the gap is more than that.
+    differs from ideal sensors in the plant; where that isn't known, the channel's noise, or, of a recording
+    into which something was put, what its diagnosis leaves of the recording as it is: the machine's own.
+    ``None`` where less than a tenth of the gap is more than that.
 
     Args:
         case: the case.
         gap: the verdict's, by channel.
         readings: of the means that were compared.
+        without: the verdict's on the recording as it is.
     """
     best: tuple[float, float] | None = None
     for channel, own in gap.items():
         floor = _floor(case, channel, readings) or own["noise"]
+        if without and channel in without:
+            floor = max(floor, without[channel]["after"])
         if not floor or own["refit"] < CLOSABLE * floor:
             continue
         excess = own["refit"] / floor

@@ -134,7 +134,7 @@ def lara() -> Joint:
     record = Measured("joint 3", time, {"motor_angle": motor, "output_angle": output, "motor_torque": torque})
     # Stiffness as in SOURCE.md, friction by its author's law there. Weight and inertia follow from the twist.
     stiffness = 2.2e4
-    weight, hanging, inertia = _arm(record, ratio, stiffness)
+    weight, hanging, inertia = _arm(record, ratio)
     coulomb, viscous = (6.53 + 1.149) / ratio, 12 * 1.149 / ratio**2
     gravity = (
         f"  gravity: {{mass_kg: {weight / 9.80665 / 0.4:.6g}, centre_of_mass_m: 0.4, "
@@ -149,14 +149,17 @@ def lara() -> Joint:
                  ("kinematic_error",))  # fmt: skip
 
 
-def _arm(record: Measured, ratio: float, stiffness: float) -> tuple[float, float, float]:
-    """Weight times lever (N m), angle at which the arm hangs (rad), inertia (kg m^2), from the twist."""
+def _arm(record: Measured, ratio: float) -> tuple[float, float, float]:
+    """Weight times lever (N m), angle at which the arm hangs (rad), inertia (kg m^2), from the motor's torque.
+
+    Not from the twist: that holds the encoders' own errors once a turn, too.
+    """
     output = record.channels["output_angle"]
-    twist = record.channels["motor_angle"] / ratio - output
-    _, acceleration = rates(record.time, output)
-    columns = np.column_stack([np.ones_like(output), np.cos(output), np.sin(output), acceleration])
-    _, c, s, a = stiffness * np.linalg.lstsq(columns, twist, rcond=None)[0]
-    # Twist times stiffness is w sin(q - h) + J q'' = w cos(h) sin(q) - w sin(h) cos(q) + J q''.
+    velocity, acceleration = rates(record.time, output)
+    friction = [np.ones_like(output), np.tanh(ratio * velocity / 0.5), velocity]
+    columns = np.column_stack([np.cos(output), np.sin(output), acceleration, *friction])
+    c, s, a = np.linalg.lstsq(columns, ratio * record.channels["motor_torque"], rcond=None)[0][:3]
+    # The torque is w sin(q - h) + J q'' = w cos(h) sin(q) - w sin(h) cos(q) + J q'' and friction.
     return float(np.hypot(c, s)), float(np.arctan2(-c, s)), float(max(a, 0.5))
 
 

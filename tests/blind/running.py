@@ -133,7 +133,11 @@ def attempt(task: Task) -> Line:
         raise AbsentError(f"{case.key}: {samples} samples, more than {task.most_samples}")
     if case.without is not None:
         line["without"] = _without(case.without)
-    return line | _diagnosed(case)
+    line |= _diagnosed(case)
+    if case.without is not None and line.get("verdict") and line["without"]["verdict"]:
+        verdict, plain = line["verdict"], line["without"]["verdict"]
+        line["closed"] = closed(case, verdict["gap"], verdict["readings"], plain["gap"])
+    return line
 
 
 #: Diagnoses of recordings as they are, by what is told apart in their keys.

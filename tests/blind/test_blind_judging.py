@@ -142,6 +142,9 @@ def test_what_can_be_closed_and_numbers_that_hold():
     gap = {"motor_torque": {"refit": 12.0, "after": 3.0, "noise": 9.0}}
     assert closed(case, gap) == pytest.approx(0.9, abs=0.01)
     assert closed(case, {"motor_torque": {"refit": 2.1, "after": 3.0, "noise": 9.0}}) is None
+    # What the machine itself leaves is nobody's to close.
+    own = {"motor_torque": {"after": 2.9, "noise": 1.0}}
+    assert closed(case, gap, without=own) == pytest.approx((12.0 - 3.0) / (12.0 - 2.9), abs=1e-3)
 
     def number(value, low, high):
         return {"value": value, "interval": [low, high]}
