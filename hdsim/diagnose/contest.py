@@ -41,13 +41,13 @@ SMALL = 0.2
 
 @dataclass
 class _Point:
-    """Where the base is linear: its numbers, and what it leaves there.
+    """Where the base is linear: its numbers and those of the effects that it has, and what it leaves there.
 
     Attributes:
         theta: logarithms of factors on the fitted base's numbers, shape (f,).
         state: the base there.
         predictions: its predictions.
-        columns: sensitivities to the numbers, shape (rows, f).
+        columns: sensitivities to all numbers, shape (rows, p).
         left: whitened residual, shape (rows,).
     """
 
@@ -63,8 +63,7 @@ def _as_given(bench: Bench, base: Fit) -> _Point:
     frees = at_present(base)
     state = scaled(base.state, frees, (-base.theta).tolist())
     there = [free.moved(-t) for free, t in zip(frees, base.theta, strict=True)]
-    # All effects are held there.
-    vector = Vector(state, tuple(there), len(state.added))
+    vector = Vector(state, tuple(there), 0)
     predictions = bench.predict(state)
     return _Point(
         -base.theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
@@ -93,14 +92,18 @@ def contest(
             if name not in best or loss < best[name][0]:
                 best[name] = loss, each
 
-    f = len(base.frees)
     left = bench.stacked(bench.residuals(base.predictions))
-    here = _Point(np.zeros(f), base.state, base.predictions, base.columns[:, :f], left)
+    here = _Point(np.zeros(len(base.frees)), base.state, base.predictions, base.columns, left)
     for one in shortlist:
         tell(f"fitting {one.name}")
-        for each in (one, *one.others):
+        several = [one, *one.others]
+        # A screen's traces may be of an earlier model.
+        anew = designs(bench, base.state, base.predictions, [each.added for each in several])
+        for each, columns in zip(several, anew, strict=True):
+            if columns is None:
+                continue
             rest = residual.values - residual.project(each.columns) @ np.array(each.added.coefficients)
-            keep(one.name, _roughly(bench, base, here, each.added, each.columns, _power(bench, rest)))
+            keep(one.name, _roughly(bench, base, here, each.added, columns, _power(bench, rest)))
     if not best:
         return []
     noise = sum(bench.noise_powers.values())
@@ -146,62 +149,61 @@ def _from_given(bench: Bench, base: Fit, given: _Point, added: Added) -> list[Fi
     if columns is None:
         return []
     # Delays stay where they are: nothing bounds them here.
-    both = np.hstack([given.columns * np.array([not free.step for free in base.frees]), columns])
+    moving = np.ones(given.columns.shape[1])
+    moving[: len(base.frees)] = [not free.step for free in base.frees]
+    both = np.hstack([given.columns * moving, columns])
     found, *_ = np.linalg.lstsq(both, given.left, rcond=1e-6)
-    free = added.fitting.signed(added.orders)
-    coefficients = np.where(
-        free, found[given.columns.shape[1] :], np.maximum(found[given.columns.shape[1] :], 0.0)
-    )
-    power = _power(bench, given.left - both @ found)
-    return _roughly(bench, base, given, replace(added, coefficients=tuple(coefficients)), columns, power)
+    return _roughly(bench, base, given, added, columns, _power(bench, given.left - both @ found))
 
 
 def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Array, power: float) -> list[Fit]:
     """The model with an effect, a few steps from where a linear fit says that it lies.
 
-    Compliances are far from linear in their shape, and the drive's own stands in for them: they start closer
-    to the base too, and where all that the re-fit made the drive softer is theirs.
+    The effects before it move along: they may have taken what is its. Compliances are far from linear in
+    their shape, and the drive's own stands in for them: they start closer to the base too, and where all that
+    the re-fit made the drive softer is theirs.
 
     Args:
         bench: the measured series.
         base: the fitted model without the effect.
         point: where the base is linear.
-        added: the effect with its coefficients of the linear fit.
+        added: the effect.
         columns: its trace at the point, shape (rows, k).
         power: what one independent sample of the linear fit's residual counts.
     """
-    frees, coefficients = at_present(base), np.array(added.coefficients)
-    ridge = np.array([power / free.prior**2 for free in frees])
-    square = point.columns.T @ point.columns + np.diag(ridge)
-    away = np.array([free.none for free in frees]) - point.theta
-    moves = np.linalg.solve(square, point.columns.T @ (point.left - columns @ coefficients) + ridge * away)
-    stiff = np.array([free.compliance for free in frees], dtype=bool)
+    frees = at_present(base)
+    f, before_it = len(frees), Vector(base.state, (), 0)
+    x0 = before_it.start()
+    moves, coefficients = _linear(base, point, added, columns, power)
+    stiff = np.array([*(free.compliance for free in frees), *(False for _ in x0)], dtype=bool)
     series = added.fitting.in_series
     if series:
         # Beside a compliance it is the drive's own compliance, not its stiffness, that moves in proportion.
-        moves = np.where(stiff, -np.log1p(-np.clip(moves, None, SOFTEST)), moves)
-    moves = np.clip(moves, -FARTHEST, FARTHEST)
+        given_away = -np.log1p(-np.clip(moves, None, SOFTEST))
+        moves = np.where(stiff, np.clip(given_away, -FARTHEST, FARTHEST), moves)
     begins = [(coefficients, moves)]
     if series and point.state is base.state:
         begins.append((SMALL * coefficients, SMALL * moves))
-        stiffer = np.where(stiff, np.maximum(-base.theta, 0.0), 0.0)
+        stiffer = np.zeros(len(moves))
+        stiffer[:f] = np.where(stiff[:f], np.maximum(-base.theta, 0.0), 0.0)
         size = float(columns[:, 0] @ (point.columns @ np.expm1(-stiffer)) / (columns[:, 0] @ columns[:, 0]))
         if size > 0:
             begins.append((np.array([size]), stiffer))
     if added.fitting.play:
         # By as much as the trace is too small, the spring beyond the play is stiffer.
         beyond = math.log(max(float(coefficients[0]), 1.0))
-        begins.append((np.ones(1), np.clip(np.where(stiff, beyond, moves), -FARTHEST, FARTHEST)))
-    held = len(base.state.added)
+        begins.append((np.ones(1), np.where(stiff, np.clip(beyond, -FARTHEST, FARTHEST), moves)))
+    lower, upper = before_it.bounds()
     found: list[Fit] = []
 
     def begin(start: Array, move: Array) -> None:
-        state = replace(base.state, added=(*base.state.added, replace(added, coefficients=tuple(start))))
-        theta = {free.name: float(t) for free, t in zip(frees, point.theta + move, strict=True)}
+        earlier = before_it.state(np.clip(x0 + move[f:], lower, upper)).added
+        state = replace(base.state, added=(*earlier, replace(added, coefficients=tuple(start))))
+        theta = {free.name: float(t) for free, t in zip(frees, point.theta + move[:f], strict=True)}
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             found.append(
-                fit(bench, state, frees, held_effects=held, prune=False, evaluations=ROUGH, theta=theta,
-                    after=base, known=(np.hstack([point.columns, columns]), power), rough=True)
+                fit(bench, state, frees, prune=False, evaluations=ROUGH, theta=theta, after=base,
+                    known=(np.hstack([point.columns, columns]), power), rough=True)
             )  # fmt: skip
 
     for start, move in begins:
@@ -213,16 +215,37 @@ def _roughly(bench: Bench, base: Fit, point: _Point, added: Added, columns: Arra
     return found
 
 
+def _linear(base: Fit, point: _Point, added: Added, columns: Array, power: float) -> tuple[Array, Array]:
+    """How the model's numbers move, shape (p,), and an effect's coefficients, shape (k,), by a linear fit.
+
+    All at once, with their priors and bounds: what an effect says as well as the model's numbers do is shared
+    out by what was believed of those, and nothing goes where neither the data nor a prior tell.
+    """
+    from scipy.optimize import lsq_linear
+
+    p, n = point.columns.shape[1], point.columns.shape[1] + columns.shape[1]
+    unit = replace(added, coefficients=(0.0,) * columns.shape[1])
+    vector = Vector(replace(base.state, added=(*base.state.added, unit)), tuple(at_present(base)), 0)
+    x0 = vector.start({free.name: float(t) for free, t in zip(vector.frees, point.theta, strict=True)})
+    both, priors = np.hstack([point.columns, columns]), vector.priors()[:n]
+    lower, upper = (end[:n] - x0[:n] for end in vector.bounds())
+    far = np.where(np.arange(n) < len(base.frees), FARTHEST, np.inf)
+    bounds = np.minimum(np.maximum(lower, -far), 0.0), np.maximum(np.minimum(upper, far), 0.0)
+    root = np.linalg.cholesky(both.T @ both / power + np.diag(priors**-2))
+    aim = both.T @ point.left / power + (vector.centre(x0) - x0)[:n] / priors**2
+    found = lsq_linear(root.T, np.linalg.solve(root, aim), bounds).x
+    return found[:p], found[p:]
+
+
 def _fully(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
     """A rough fit carried on to its end, if it gets there."""
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     state = replace(base.state, added=found.state.added)
     evaluations = FULL + 4 * bool(found.state.added[-1].shapes)
     known = found.columns, _power(bench, bench.stacked(bench.residuals(found.predictions)))
-    held = len(base.state.added)
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-        full = fit(bench, state, found.frees, held_effects=held, prune=False, evaluations=evaluations,
-                   theta=theta, after=base, known=known, rough=True)  # fmt: skip
+        full = fit(bench, state, found.frees, prune=False, evaluations=evaluations, theta=theta, after=base,
+                   known=known, rough=True)  # fmt: skip
         return [full]
     return []
 

@@ -305,8 +305,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, 
             own = named if named.name == own.name or not same or stuck else own
             if own is named:
                 # It was fitted last: back to its place.
-                fitted = named.fit.state.added[-1]
-                state = replace(named.fit.state, added=(*others[:k], fitted, *others[k:]))
+                *moved, fitted = named.fit.state.added
+                state = replace(named.fit.state, added=(*moved[:k], fitted, *moved[k:]))
                 current = together(bench, named.fit, state, rough=True)
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from contract import Case
@@ -122,9 +122,14 @@ def stated(line: Line) -> float | None:
 
 
 def closed(
-    case: Case, gap: dict[str, Any], readings: int = 1, without: dict[str, Any] | None = None
+    case: Case,
+    gap: dict[str, Any],
+    readings: int = 1,
+    without: dict[str, Any] | None = None,
+    *,
+    since: Literal["before", "refit"] = "refit",
 ) -> float | None:
-    """Share of the held-out gap after the re-fit that was closed, of what noise leaves to close.
+    """Share of the held-out gap that was closed, of what noise leaves to close.
 
     Of the channel whose gap over its best possible is largest. The best possible is what the held-out log
     differs from ideal sensors in the plant; where that isn't known, the channel's noise, or, of a recording
@@ -136,17 +141,18 @@ def closed(
         gap: the verdict's, by channel.
         readings: of the means that were compared.
         without: the verdict's on the recording as it is.
+        since: of the gap after the re-fit (what a bent base cannot explain), or of the model's as given.
     """
     best: tuple[float, float] | None = None
     for channel, own in gap.items():
         floor = _floor(case, channel, readings) or own["noise"]
         if without and channel in without:
             floor = max(floor, without[channel]["after"])
-        if not floor or own["refit"] < CLOSABLE * floor:
+        if not floor or own[since] < CLOSABLE * floor:
             continue
-        excess = own["refit"] / floor
+        excess = own[since] / floor
         if best is None or excess > best[0]:
-            best = (excess, (own["refit"] - own["after"]) / (own["refit"] - floor))
+            best = (excess, (own[since] - own["after"]) / (own[since] - floor))
     return None if best is None else round(best[1], 4)
 
 

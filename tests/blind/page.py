@@ -137,6 +137,10 @@ def _measures(lines: Sequence[Line]) -> dict[str, tuple[int, int]]:
     found["nine tenths of the closable held-out gap closed, strength from 3.5"] = share(
         closable, lambda r: r["closed"] >= CLOSED
     )
+    given = [r for r in hidden if r.get("closed_since_before") is not None and min(r["strength"]) >= CLEAR]
+    found["the same of the gap before the re-fit"] = share(
+        given, lambda r: r["closed_since_before"] >= CLOSED
+    )
     numbers = [row for r in lines for row in r.get("numbers", [])]
     found["true number in its 95 % interval"] = (sum(row[5] for row in numbers), len(numbers))
     found["stopped with an error"] = share(lines, lambda r: outcome(r) == "error")

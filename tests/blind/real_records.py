@@ -150,7 +150,7 @@ def lara() -> Joint:
 
 
 def _arm(record: Measured, ratio: float) -> tuple[float, float, float]:
-    """Weight times lever (N m), angle at which the arm hangs (rad), inertia (kg m^2), from the motor's torque.
+    """Weight times lever (N m), angle at which the arm hangs (rad), inertia (kg m^2), by the motor's torque.
 
     Not from the twist: that holds the encoders' own errors once a turn, too.
     """

@@ -136,7 +136,7 @@ def attempt(task: Task) -> Line:
     line |= _diagnosed(case)
     if case.without is not None and line.get("verdict") and line["without"]["verdict"]:
         verdict, plain = line["verdict"], line["without"]["verdict"]
-        line["closed"] = closed(case, verdict["gap"], verdict["readings"], plain["gap"])
+        line |= _closed(case, verdict, plain["gap"])
     return line
 
 
@@ -176,14 +176,22 @@ def _diagnosed(case: Case) -> Line:
     found |= {
         "verdict": verdict,
         "seconds": verdict["seconds"],
-        "closed": closed(case, verdict["gap"], verdict["readings"]),
         "numbers": covered(case, verdict),
         "expected": case.numbers,
+        **_closed(case, verdict),
     }
     evidence = getattr(diagnosis, "evidence", None)
     if evidence is not None:
         found["evidence"] = evidence.model_dump(mode="json")
     return found
+
+
+def _closed(case: Case, verdict: Line, plain: Line | None = None) -> Line:
+    gap, readings = verdict["gap"], verdict["readings"]
+    return {
+        "closed": closed(case, gap, readings, plain),
+        "closed_since_before": closed(case, gap, readings, plain, since="before"),
+    }
 
 
 def _words(error: Exception) -> str:

@@ -139,8 +139,9 @@ def test_what_can_be_closed_and_numbers_that_hold():
     true = {"components.0.order": 2.0, "components.0.phase_deg": 359.0, "load.inertia_kg_m2": 3.0}
     hidden = (frozenset({"kinematic_error"}),)
     case = Case("numpy/effect/x/0/1", "numpy", "effect", hidden, (measured,), (), "", numbers=true)
-    gap = {"motor_torque": {"refit": 12.0, "after": 3.0, "noise": 9.0}}
+    gap = {"motor_torque": {"before": 22.0, "refit": 12.0, "after": 3.0, "noise": 9.0}}
     assert closed(case, gap) == pytest.approx(0.9, abs=0.01)
+    assert closed(case, gap, since="before") == pytest.approx(0.95, abs=0.01)
     assert closed(case, {"motor_torque": {"refit": 2.1, "after": 3.0, "noise": 9.0}}) is None
     # What the machine itself leaves is nobody's to close.
     own = {"motor_torque": {"after": 2.9, "noise": 1.0}}

@@ -1,0 +1,79 @@
+"""Where candidates begin: what they share with the model's own numbers and with the effects before them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnose_bench import rigid_record, scenario
+
+from hdsim.diagnose.contest import _linear, _Point, contest
+from hdsim.diagnose.orders import order_lines
+from hdsim.diagnose.search import left_of
+from hdsim.diagnose.traces import screen
+from hdsim.estimate.fit import sharpened
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.refit import refit, together
+from hdsim.estimate.state import state_of
+
+RATIO, WEIGHT = 100.0, 30.0
+#: A weight that the base's own arm (along the sine) can make up for in part only, N m at 60 degrees to it.
+HIDDEN, AHEAD = 8.0, math.radians(60.0)
+
+
+def arms(angle, velocity):
+    """Torque on the motor of the arm that the base has, of the weight beside it, of a ripple."""
+    own = WEIGHT * np.sin(angle / RATIO) + HIDDEN * np.sin(angle / RATIO + AHEAD)
+    return own / RATIO + 0.03 * np.sin(6 * angle + 0.4)
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory):
+    base = scenario(tmp_path_factory.mktemp("contest"))
+    gravity = type(base.load).model_validate(
+        {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": WEIGHT / 9.80665 / 0.4, "centre_of_mass_m": 0.4}}
+    )
+    base = base.model_copy(update={"load": gravity})
+    bench = bench_for([rigid_record(extra=arms)], [], base, None)
+    return bench, refit(bench, state_of(base)).fit
+
+
+def candidate(bench, fit, name):
+    left, residuals = left_of(bench, fit), bench.residuals(fit.predictions)
+    lines = [line for channel in bench.channels for line in order_lines(bench, residuals, channel)]
+    screening = screen(bench, fit.state, left, lines)
+    return left, next(one for one in screening.ranked if one.name == name)
+
+
+def test_what_numbers_of_the_base_can_say_is_held_by_what_was_believed_of_them(opened):
+    bench, base = opened
+    _, one = candidate(bench, base, "unbalance")
+    rest = bench.stacked(bench.residuals(base.predictions))
+    point = _Point(np.zeros(len(base.frees)), base.state, base.predictions, base.columns, rest)
+    # Mass and weight are three numbers for two directions; a trace is as exact as its simulation.
+    rng = np.random.default_rng(1)
+    size = np.sqrt(np.mean(one.columns**2))
+    columns = one.columns + 1e-3 * size * rng.standard_normal(one.columns.shape)
+    moves, coefficients = _linear(base, point, one.added, columns, float(np.mean(rest**2)))
+    mass = [free.name for free in base.frees].index("load.gravity.mass_kg")
+    theta = base.theta[mass] + moves[mass]
+    assert abs(theta) < 0.3
+    found = replace(one.added, coefficients=tuple(coefficients)).settings()
+    beside = 9.80665 * found["output_kg_m"] * np.exp(1j * math.radians(found["output_phase_deg"] + 90.0))
+    # The output turns against the motor.
+    whole = WEIGHT * math.exp(theta) + np.conj(beside)
+    assert abs(whole - (WEIGHT + HIDDEN * np.exp(1j * AHEAD))) < 0.03 * WEIGHT
+
+
+def test_effects_that_are_there_move_along(opened):
+    bench, base = opened
+    _, ripple = candidate(bench, base, "motor_torque_ripple")
+    # One that took too much: the next candidate shows only where it gives that back.
+    wrong = replace(ripple.added, coefficients=tuple(1.5 * c for c in ripple.added.coefficients))
+    stuck = replace(base, state=replace(base.state, added=(wrong,)))
+    stuck.predictions = bench.predict(stuck.state)
+    stuck = sharpened(bench, stuck)
+    left, one = candidate(bench, stuck, "unbalance")
+    ((_, found, _),) = contest(bench, stuck, [one], left, None)
+    best = together(bench, found)
+    assert bench.power(found.predictions) < 1.05 * bench.power(best.predictions)
