@@ -26,10 +26,10 @@ def candidates(diagnosis: Diagnosis) -> dict[str, Fit]:
     if diagnosis.verdict.verdict != "effect":
         return {}
     bench = diagnosis.bench
-    for k, one in enumerate(diagnosis.named):
+    for one in diagnosis.named:
         others = {name: one.alternatives[name] for name in one.group if name in one.alternatives}
         if others:
-            return {name: settled(bench, each, k) for name, each in {one.name: one.fit, **others}.items()}
+            return {name: settled(bench, each) for name, each in {one.name: one.fit, **others}.items()}
     last = diagnosis.named[-1]
     if diagnosis.verdict.effects[-1].confidence < WEAK and len(diagnosis.named) == 1:
         return {last.name: settled(bench, last.fit), NOTHING: diagnosis.refit.fit}

@@ -41,25 +41,25 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
         others: list[Fit | None] = []
         for k, one in enumerate(named):
             tell(f"without {one.name}")
-            rest = _without(bench, current, k, rough=len(named) == 2)
+            rest = without(bench, current, k, rough=len(named) == 2)
             one.needed, one.worth = 1.0, math.inf
             if rest is not None:
                 one.needed = needed(bench, rest, current)
                 one.worth = bench.power(rest.predictions) - bench.power(current.predictions)
             others.append(rest)
         k = min(range(len(named)), key=lambda k: named[k].needed)
-        without = others[k]
-        if without is None or named[k].needed >= NEEDLESS:
+        left_out = others[k]
+        if left_out is None or named[k].needed >= NEEDLESS:
             break
         del named[k]
         # What the others make up for it takes them a few more steps.
-        current = together(bench, without)
+        current = together(bench, left_out)
     if len(named) == 1:
         named[0].needed = 1.0
     return current
 
 
-def _without(bench: Bench, current: Fit, k: int, *, rough: bool) -> Fit | None:
+def without(bench: Bench, current: Fit, k: int, *, rough: bool) -> Fit | None:
     """The model without an effect, all the rest fitted anew from where it was; None where that fails.
 
     Args:
@@ -69,9 +69,7 @@ def _without(bench: Bench, current: Fit, k: int, *, rough: bool) -> Fit | None:
         rough: of two names neither can have been needed for the sake of the other alone.
     """
     added = current.state.added
-    widths = [len(one.coefficients) + len(one.shapes) for one in added]
-    first = len(current.frees) + sum(widths[:k])
-    columns = np.delete(current.columns, np.s_[first : first + widths[k]], axis=1)
+    columns = np.delete(current.columns, current.numbers_of(k), axis=1)
     state = replace(current.state, added=(*added[:k], *added[k + 1 :]))
     try:
         return fit(
@@ -82,7 +80,7 @@ def _without(bench: Bench, current: Fit, k: int, *, rough: bool) -> Fit | None:
         return None
 
 
-def needed(bench: Bench, without: Fit, whole: Fit) -> float:
+def needed(bench: Bench, less: Fit, whole: Fit) -> float:
     """Part of what a model lacks that another has, in the channel where that is most.
 
     A channel counts where it is better off by more than the freedom of one more effect is worth to the
@@ -90,18 +88,19 @@ def needed(bench: Bench, without: Fit, whole: Fit) -> float:
 
     Args:
         bench: the measured series.
-        without: the model that lacks something.
+        less: the model that lacks something.
         whole: the one that has it.
     """
-    noise, less, more = bench.noise_powers, *(bench.channel_powers(f.predictions) for f in (without, whole))
+    noise = bench.noise_powers
+    before, after = (bench.channel_powers(f.predictions) for f in (less, whole))
     rest, series = bench.stacked(bench.residuals(whole.predictions)), bench.stacked_series()
-    blocks, numbers = bench.stacked_blocks(), whole.columns.shape[1] - without.columns.shape[1]
+    blocks, numbers = bench.stacked_blocks(), whole.columns.shape[1] - less.columns.shape[1]
     best = 0.0
     for channel in bench.channels:
         rows = np.isin(series, [k for k, s in enumerate(bench.series) if s.channel == channel])
         alike = correlation(rest[rows], blocks[rows])
         worth = float(np.mean(rest[rows] ** 2)) * alike * math.log(max(rows.sum() / alike, 2.0))
-        beyond, gained = less[channel] - noise[channel], less[channel] - more[channel]
+        beyond, gained = before[channel] - noise[channel], before[channel] - after[channel]
         if gained > worth * max(numbers, 1) and beyond > EXCESS * noise[channel]:
             best = max(best, min(gained / beyond, 1.0))
     return best

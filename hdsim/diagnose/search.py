@@ -9,20 +9,19 @@ more is found, and all is asked once more when they have explained something.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hdsim.diagnose.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnose.name import LEAST_SHARE, SAME, Named, name_effect
 from hdsim.diagnose.orders import Line, order_lines, power_of
-from hdsim.diagnose.revise import revised
+from hdsim.diagnose.revise import revised, without
 from hdsim.diagnose.screen import LEVEL, Residual
 from hdsim.diagnose.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
-from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import align, reweigh, together, with_delays
 from hdsim.estimate.unwound import unwound
@@ -146,7 +145,9 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     reweigh(bench, current)
     if len(found.named) > 1:
         tell = during("again", "asking each name again beside the others")
-        current = _again(bench, base, together(bench, current, rough=True), found, tell)
+        if current.undetermined:
+            current = together(bench, current, rough=True)
+        current = _again(bench, base, current, found, tell)
         current = sharpened(bench, current)
         align(bench, current)
         reweigh(bench, current)
@@ -218,11 +219,10 @@ def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
 def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
     """Channels in which each added effect shows more than the noise: in others it can leave nothing."""
     numbers, noise = bench.stacked_series(), bench.noise_powers
-    at, found = len(current.frees), []
-    for added in current.state.added:
-        columns = current.columns[:, at : at + len(added.coefficients)]
+    found = []
+    for k, added in enumerate(current.state.added):
+        columns = current.columns[:, current.numbers_of(k)][:, : len(added.coefficients)]
         powers = (columns @ np.array(added.coefficients)) ** 2
-        at += len(added.coefficients) + len(added.shapes)
         own = {
             channel: sum(
                 float(powers[numbers == k].sum()) for k, s in enumerate(bench.series) if s.channel == channel
@@ -269,26 +269,23 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, 
         settled = bench.power(current.predictions) > (1.0 - NEWS) * first
         if k == len(found.named) - 1 and settled and not (stuck or every):
             break
-        own = found.named[k]
-        added = list(current.state.added)
-        others = added[:k] + added[k + 1 :]
-        try:
-            without = together(bench, current, replace(current.state, added=tuple(others)), rough=True)
-        except (PredictionError, np.linalg.LinAlgError):
+        own, added = found.named[k], current.state.added
+        rest = without(bench, current, k, rough=True)
+        if rest is None:
             k += 1
             continue
-        left = left_of(bench, without)
+        left = left_of(bench, rest)
         lines: list[Line] = []
-        residuals = bench.residuals(without.predictions)
+        residuals = bench.residuals(rest.predictions)
         for channel in bench.channels:
             lines += order_lines(bench, residuals, channel)
         tell(f"{own.name} again")
-        screening = screen(bench, without.state, left, lines, before=found.stages[0].screening)
+        screening = screen(bench, rest.state, left, lines, before=found.stages[0].screening)
         named = None
         if screening.ranked and screening.chance <= LEVEL:
-            named = name_effect(bench, without, screening, left, on_step=tell)
-        rest = found.named[:k] + found.named[k + 1 :]
-        if named is None or (rest and _gain(bench, base, without, named.fit) < BEYOND_GAIN):
+            named = name_effect(bench, rest, screening, left, on_step=tell)
+        alone = len(found.named) == 1
+        if named is None or (not alone and _gain(bench, base, rest, named.fit) < BEYOND_GAIN):
             # The others explain what it did, so what it explained is theirs.
             gone, newest = found.named.pop(k), found.named[-1] if found.named else None
             if newest is not None and k < len(found.named):
@@ -297,7 +294,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, 
                 if newest.name in gone.group:
                     # It was as good a name before, and neither is needed beside the other.
                     newest.group[gone.name] = 1.0
-            current = without
+            current = rest
             continue
         loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
         same = named.name == own.name or own.name in named.group
@@ -305,9 +302,8 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, 
             own = named if named.name == own.name or not same or stuck else own
             if own is named:
                 # It was fitted last: back to its place.
-                *moved, fitted = named.fit.state.added
-                state = replace(named.fit.state, added=(*moved[:k], fitted, *moved[k:]))
-                current = together(bench, named.fit, state, rough=True)
+                last = len(added) - 1
+                current = named.fit.ordered([*range(k), last, *range(k, last)])
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0

@@ -58,6 +58,26 @@ class Fit:
     ties: dict[str, list[str]]
     beside: tuple[Array, Array] | None = None
 
+    def numbers_of(self, effect: int) -> slice:
+        """Where the numbers of an effect of ``state.added`` stand among all free numbers."""
+        widths = [len(one.coefficients) + len(one.shapes) for one in self.state.added]
+        first = len(self.frees) + sum(widths[:effect])
+        return slice(first, first + widths[effect])
+
+    def ordered(self, effects: Sequence[int]) -> Fit:
+        """The same fit with its effects in another order."""
+        order = [*range(len(self.frees)), *(k for e in effects for k in _range(self.numbers_of(e)))]
+        return replace(
+            self,
+            state=replace(self.state, added=tuple(self.state.added[e] for e in effects)),
+            covariance=self.covariance[np.ix_(order, order)],
+            columns=self.columns[:, order],
+        )
+
+
+def _range(part: slice) -> range:
+    return range(part.start, part.stop)
+
 
 def fit(
     bench: Bench,
@@ -167,11 +187,10 @@ def _standing_in(columns: Array, priors: Array, change: Array) -> Array:
     return np.asarray(np.clip(moves * priors, -REACH, REACH) if len(priors) else moves)
 
 
-def settled(bench: Bench, found: Fit, held_effects: int = 0) -> Fit:
+def settled(bench: Bench, found: Fit) -> Fit:
     """A rough fit carried on to its very end, with the sensitivities and the covariance there."""
     known = found.columns, math.nan
-    return fit(bench, found.state, at_present(found), held_effects=held_effects, prune=False,
-               evaluations=EVALUATIONS, after=found, known=known)  # fmt: skip
+    return fit(bench, found.state, at_present(found), prune=False, after=found, known=known)
 
 
 def sharpened(bench: Bench, found: Fit) -> Fit:
@@ -223,14 +242,11 @@ def _tied(found: Fit, k: int) -> list[str]:
     return [free.name for j, free in enumerate(found.frees) if j != k and with_it[j] >= TIED]
 
 
-def added_spreads(found: Fit, held_effects: int = 0) -> list[tuple[Added, Array, Array]]:
+def added_spreads(found: Fit) -> list[tuple[Added, Array, Array]]:
     """Each fitted effect with covariance of its coefficients and standard deviations of log shapes."""
-    at = len(found.frees)
     result = []
-    for added in found.state.added[held_effects:]:
-        c, s = len(added.coefficients), len(added.shapes)
-        covariance = found.covariance[at : at + c, at : at + c]
-        shapes = np.sqrt(np.diag(found.covariance)[at + c : at + c + s])
-        result.append((added, covariance, shapes))
-        at += c + s
+    for k, added in enumerate(found.state.added):
+        own = found.covariance[found.numbers_of(k), found.numbers_of(k)]
+        c = len(added.coefficients)
+        result.append((added, own[:c, :c], np.sqrt(np.diag(own)[c:])))
     return result
