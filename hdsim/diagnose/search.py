@@ -270,7 +270,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, 
         if k == len(found.named) - 1 and settled and not (stuck or every):
             break
         own, added = found.named[k], current.state.added
-        rest = without(bench, current, k, rough=True)
+        rest = without(bench, current, k)
         if rest is None:
             k += 1
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -29,6 +29,8 @@ class NamedEffect(Part):
     """Cross-validated share of the residual that its trace explained when it was found."""
     parameters: dict[str, FittedNumber] = {}
     """Its fitted fields."""
+    settings: dict[str, Any] = {}
+    """Its fields as the scenario has them, also those that were not fitted, such as orders."""
     indistinguishable_from: list[str] = []
     """Effects that explain these data as well."""
     separated_by: dict[str, str] = {}

@@ -278,6 +278,7 @@ def _effects(named: Sequence[Named], decision: Decision, final: Fit) -> list[Nam
                 chance=one.chance,
                 explained=one.share,
                 parameters=fitted_numbers(added, covariance, shapes),
+                settings=added.settings(),
                 indistinguishable_from=list(one.group),
                 separated_by={
                     other: confused.get(other) or known[other].signature.confused_with.get(one.name, "")

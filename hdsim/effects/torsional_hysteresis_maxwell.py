@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
 
-from hdsim.effects._fitting import Amplitude, Fitting, Plausible
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
 from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Parameters, Signature, State
@@ -62,7 +62,8 @@ class TorsionalHysteresisMaxwell(Effect):
     what an element can lose is 1/p of its torque. (Without that threshold, as in Bouc-Wen's |F/W|^p, every
     cycle under a bias takes a part of it.)
 
-    Without ``elements``, ``slip_torque_nm`` is shared equally by elements that slip at ``slip_twists_mrad``.
+    Without ``elements``, ``slip_torque_nm`` is shared equally by elements that slip at ``slip_twists_mrad``
+    times ``slip_twist_scale``.
     The elements stiffen the drive on reversal by sum k_i; a catalogue stiffness contains that already.
     """
 
@@ -85,9 +86,12 @@ class TorsionalHysteresisMaxwell(Effect):
             "lugre_friction": "absent with the wave generator locked",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = tuple(
-        Fitting((Amplitude({"slip_torque_nm": 1.0}),), settings={"slip_twists_mrad": twists})
-        for twists in ([0.05, 0.15, 0.4], [0.1, 0.3, 0.8])
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"slip_torque_nm": 1.0}),),
+            # Over less it would be a friction at the output, over more a spring.
+            (Shape("slip_twist_scale", (0.5, 1.0), least=0.1, most=2.0),),
+        ),
     )
 
     elements: tuple[SlipElement, ...] | None = Field(None, min_length=1)
@@ -101,6 +105,10 @@ class TorsionalHysteresisMaxwell(Effect):
     """Total torque of all sliders, N m: half of the loop's width in torque, at full slip."""
     slip_twists_mrad: tuple[float, ...] = Field((0.1, 0.3, 0.8), min_length=1)
     """Twists at which equal shares of the torque slip, from rest, mrad."""
+    slip_twist_scale: Annotated[
+        float, Plausible(0.1, 2.0, "the last twist within the wind-up of the first stiffness")
+    ] = Field(1.0, gt=0)
+    """Factor on ``slip_twists_mrad``: of a stiffer or a softer drive."""
     # Beyond a thousand a solver sees a corner.
     sharpness: Annotated[float, FIXED] = Field(200.0, ge=1, le=1000)
     """Inverse p of the share of W over which an element begins to slip."""
@@ -117,7 +125,7 @@ class TorsionalHysteresisMaxwell(Effect):
             return self.elements
         share = self.slip_torque_nm / len(self.slip_twists_mrad)
         return tuple(
-            SlipElement(stiffness_nm_per_rad=share / (1e-3 * x), slip_torque_nm=share)
+            SlipElement(stiffness_nm_per_rad=share / (1e-3 * self.slip_twist_scale * x), slip_torque_nm=share)
             for x in self.slip_twists_mrad
         )
 

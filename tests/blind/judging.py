@@ -83,14 +83,27 @@ def _named(line: Line, truth: set[str], at: dict[str, Any] | None) -> bool:
     for effect, group in zip((line["verdict"] or {}).get("effects", []), groups(line), strict=True):
         if not _holds(group, truth):
             continue
-        if at is None or not any(path.endswith(".order") for path in effect["parameters"]):
+        components = _components(effect)
+        if at is None or not components:
             return True
-        for path, number in effect["parameters"].items():
-            if path.endswith(".order") and abs(number["value"] / at["order"] - 1.0) < 0.01:
-                size = effect["parameters"].get(f"{path.removesuffix('.order')}.{at['field']}")
-                if size is None or 0.5 < abs(size["value"] / at["size"]) < 2.0:
-                    return True
+        for one in components:
+            size = one.get(at["field"])
+            same = abs(one.get("order", 0.0) / at["order"] - 1.0) < 0.01 and one.get("per") != "output_turn"
+            if same and (size is None or 0.5 < abs(size / at["size"]) < 2.0):
+                return True
     return False
+
+
+def _components(effect: dict[str, Any]) -> list[dict[str, Any]]:
+    """Components of an effect with their fields; what was fitted of them, where a line has no more."""
+    if effect.get("settings"):
+        return list(effect["settings"].get("components", []))
+    found: dict[str, dict[str, Any]] = {}
+    for path, number in effect["parameters"].items():
+        one, _, field = path.rpartition(".")
+        if one:
+            found.setdefault(one, {})[field] = number["value"]
+    return [one for one in found.values() if "order" in one]
 
 
 def _holds(group: list[str], wanted: set[str]) -> bool:

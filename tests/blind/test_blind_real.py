@@ -92,11 +92,12 @@ def test_cases_are_the_recording_and_what_was_put_in():
 def test_the_plain_model_of_the_joint_with_both_encoders_has_its_recorded_ratio_and_statics():
     known = lara()
     record = known.records[0]
-    twist = record.channels["motor_angle"] / known.ratio - record.channels["output_angle"]
-    _, acceleration = rates(record.time, record.channels["output_angle"])
     output = record.channels["output_angle"]
+    speed, acceleration = rates(record.time, output)
     mass = float(known.base.split("mass_kg: ")[1].split(",")[0])
     weight = mass * 9.80665 * 0.4 * np.sin(output - known.hanging)
-    rest = twist - (weight + known.inertia * acceleration) / known.stiffness
-    # 40 arcsec of friction and transmission error beside 400 of twist.
-    assert np.std(rest) < 0.15 * np.std(twist)
+    torque = known.ratio * record.channels["motor_torque"]
+    rest = torque - weight - known.inertia * acceleration
+    friction = np.column_stack([np.ones_like(speed), np.tanh(speed * known.ratio / 0.5), speed])
+    rest -= friction @ np.linalg.lstsq(friction, rest, rcond=None)[0]
+    assert np.std(rest) < 0.05 * np.std(torque)
