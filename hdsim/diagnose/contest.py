@@ -9,14 +9,16 @@ import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, designs
+from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
-from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.fit import Fit, at_present, fit, sharpened
 from hdsim.estimate.numbers import scaled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
@@ -35,6 +37,8 @@ FAR = 0.7
 FARTHEST = 2.0
 #: Part of the drive's compliance that the screen may give to an effect in series.
 SOFTEST = 0.85
+#: Part by which a law of compliance must leave more than one that it looks like to be fitted from there too.
+LAGS = 0.1
 #: Part of the screen's coefficient at which a compliance's fit, or one that led astray, begins a second time.
 SMALL = 0.2
 
@@ -58,15 +62,15 @@ class _Point:
     left: Array
 
 
-def _as_given(bench: Bench, base: Fit) -> _Point:
-    """The base at its numbers before they were fitted."""
+def _at(bench: Bench, base: Fit, theta: Array) -> _Point:
+    """The base at other numbers of its own, shape (f,)."""
     frees = at_present(base)
-    state = scaled(base.state, frees, (-base.theta).tolist())
-    there = [free.moved(-t) for free, t in zip(frees, base.theta, strict=True)]
+    state = scaled(base.state, frees, theta.tolist())
+    there = [free.moved(float(t)) for free, t in zip(frees, theta, strict=True)]
     vector = Vector(state, tuple(there), 0)
     predictions = bench.predict(state)
     return _Point(
-        -base.theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
+        theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
         bench.stacked(bench.residuals(predictions)),
     )  # fmt: skip
 
@@ -110,20 +114,60 @@ def contest(
     least = min(loss for loss, _ in best.values())
     if any(abs(t) > FAR for t in base.theta) and least > REACHED * noise:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            given = _as_given(bench, base)
+            given = _at(bench, base, -base.theta)
             nearest = sorted(best, key=lambda name: best[name][0])[:FAR_MOST]
             nearest = [name for name in nearest if best[name][0] <= FAR_LEFT_IN * least]
             for one in shortlist:
                 if one.name in nearest:
                     tell(f"fitting {one.name} from the numbers as given")
                     for each in (one, *one.others):
-                        keep(one.name, _from_given(bench, base, given, each.added))
+                        keep(one.name, _from(bench, base, given, each.added))
+    _after_the_best(bench, base, shortlist, best, keep, tell)
     least = min(loss for loss, _ in best.values())
     for name, (loss, found) in list(best.items()):
         if loss <= LEFT_IN * least:
             tell(f"fitting {name} in full")
             keep(name, _fully(bench, base, found))
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
+
+
+def _after_the_best(
+    bench: Bench,
+    base: Fit,
+    shortlist: Sequence[Screened],
+    best: dict[str, tuple[float, Fit]],
+    keep: Callable[[str, list[Fit]], None],
+    tell: Callable[[str], object],
+) -> None:
+    """Fit laws of compliance that look like the best one from the numbers to which that one led the base.
+
+    The base without any of them is far from where each would have it, and the way there is bent.
+    """
+    noise = sum(bench.noise_powers.values())
+    name = min(best, key=lambda name: best[name][0])
+    loss, leader = best[name]
+    rivals = [
+        one
+        for one in shortlist
+        if one.name != name
+        and one.added.fitting.in_series
+        and confusable(one.name, name)
+        and best.get(one.name, (math.inf, None))[0] > (1.0 + LAGS) * max(loss, noise)
+    ]
+    if not rivals or not leader.state.added[-1].fitting.in_series:
+        return
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        there = _at(bench, base, leader.theta)
+        for one in rivals:
+            tell(f"fitting {one.name} from where {name} led")
+            for shapes in product(*(shape.starts for shape in one.added.fitting.shapes)):
+                keep(one.name, _from(bench, base, there, replace(one.added, shapes=shapes)))
+
+
+def confusable(one: str, other: str) -> bool:
+    """Whether one of two effects says that it can look like the other."""
+    known = catalogue()
+    return other in known[one].signature.confused_with or one in known[other].signature.confused_with
 
 
 def against_priors(bench: Bench, results: Sequence[tuple[str, Fit, Array]]) -> list[tuple[str, Fit, Array]]:
@@ -143,8 +187,8 @@ def against_priors(bench: Bench, results: Sequence[tuple[str, Fit, Array]]) -> l
     return [(name, found, losses + power * strain(found) / len(losses)) for name, found, losses in results]
 
 
-def _from_given(bench: Bench, base: Fit, given: _Point, added: Added) -> list[Fit]:
-    """The model with an effect, from where a linear fit at the numbers as given says that it lies."""
+def _from(bench: Bench, base: Fit, given: _Point, added: Added) -> list[Fit]:
+    """The model with an effect, from where a linear fit at a point says that it lies."""
     (columns,) = designs(bench, given.state, given.predictions, [added])
     if columns is None:
         return []
@@ -238,7 +282,12 @@ def _linear(base: Fit, point: _Point, added: Added, columns: Array, power: float
 
 
 def _fully(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
-    """A rough fit carried on to its end, if it gets there."""
+    """A rough fit carried on to its end, if it gets there.
+
+    Short of the noise it may have stopped because its sensitivities no longer held: they are made anew.
+    """
+    if bench.power(found.predictions) > REACHED * sum(bench.noise_powers.values()):
+        found = sharpened(bench, found)
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     state = replace(base.state, added=found.state.added)
     evaluations = FULL + 4 * bool(found.state.added[-1].shapes)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnose.contest import against_priors, contest
+from hdsim.diagnose.contest import against_priors, confusable, contest
 from hdsim.diagnose.evidence import CandidateEvidence
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
@@ -228,12 +228,6 @@ def freedom(found: Fit) -> int:
     """Free numbers of a fit's last effect; orders that are read from the data are, too."""
     added = found.state.added[-1]
     return len(added.coefficients) + len(added.shapes) + len(added.orders)
-
-
-def confusable(one: str, other: str) -> bool:
-    """Whether one of two effects says that it can look like the other."""
-    known = catalogue()
-    return other in known[one].signature.confused_with or one in known[other].signature.confused_with
 
 
 def beside(residual: Residual, one: Screened, other: Screened) -> bool:
