@@ -66,6 +66,10 @@ class ContactLaw(ABC):
         """What fails above that force, for the warning."""
         return ""
 
+    def warn_beyond_validity(self, force_n: float) -> None:
+        """Warn when the law's assumptions do not hold up to a force, N."""
+        self._told(np.asarray([force_n]))
+
     def _told(self, force: Array) -> Array:
         """Warn when a force is beyond the law's validity; hand it on."""
         if force.size and np.max(force) > self.valid_up_to_n:

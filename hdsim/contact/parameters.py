@@ -47,8 +47,8 @@ class Materials(Parameters):
 class MajumdarBhushanParameters(Parameters):
     """Fractal contact of rough flanks, Eq. 2-13 of Zhang et al. (2021).
 
-    With the default flanks (structure functions summed) the stiffness of 6e7 N/m at 34.67 N that the source
-    prints needs a hardness of 2.5-2.8 GPa; the default of 3.0 GPa, usual for the steel, gives about 8e7 N/m.
+    With the default flanks and the default hardness of 3.0 GPa, usual for the steel, the stiffness at 34.67 N
+    is 4.7e8 N/m. The source prints 6e7; its own equations and flanks give 6.7e8 and more (docs/contact.md).
     """
 
     law: Literal["majumdar_bhushan"] = "majumdar_bhushan"

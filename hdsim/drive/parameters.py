@@ -235,13 +235,23 @@ class Drive(Parameters):
         return -z_f / (z_c - z_f) if self.arrangement == "circular_spline_fixed" else z_c / (z_c - z_f)
 
 
+#: A preset's mesh and the one that tabulates it.
+_SAME_TEETH = ("teeth", "tabulated")
+
+
 def _merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
-    """``over`` laid over ``base``, mappings merged; a change of a mesh's model or a law drops the base's."""
+    """``over`` laid over ``base``, mappings merged; a change of a mesh's model or a law drops the base's.
+
+    All but one change: a table of the teeth is made from the teeth that the preset has.
+    """
     result = dict(base)
     for key, value in over.items():
         below = result.get(key)
         if isinstance(value, dict) and isinstance(below, dict):
-            changed = any(tag in value and value[tag] != below.get(tag) for tag in ("model", "law", "kind"))
+            changed = any(
+                tag in value and value[tag] != below.get(tag) and (below.get(tag), value[tag]) != _SAME_TEETH
+                for tag in ("model", "law", "kind")
+            )
             result[key] = dict(value) if changed else _merged(below, value)
         else:
             result[key] = value

@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -24,8 +25,16 @@ from hdsim.drive.catalogue import (
 from hdsim.errors import PhysicsError
 
 _SEED_NAME = "seed-2021"
+_PRINTED_NAME = "seed-2021-printed-roughness"
 _SEED_RADIUS_M = 0.025  # module 0.25 mm, 200 teeth
 _SEED_FACE_WIDTH_M = 0.010
+
+#: Section ``mesh.flanks`` with both G as Table 4 of the paper prints them, identified with its Eq. 18.
+PRINTED_FLANKS: dict[str, Any] = {
+    "circular_spline": {"fractal_dimension": 2.4272, "fractal_roughness_m": 1.245e-10},
+    "flexspline": {"fractal_dimension": 2.643, "fractal_roughness_m": 1.8648e-10},
+    "structure_function_constant": "printed",
+}
 
 _EFFICIENCY_RPM = 2000.0
 _STARTING_EXPONENT = math.log(29.0 / 37.0) / math.log(160.0 / 100.0)
@@ -47,7 +56,7 @@ def _size_and_ratio(name: str) -> tuple[int, int]:
     Raises:
         ValueError: unknown name.
     """
-    known: dict[str, tuple[int, int]] = {_SEED_NAME: (20, 100)}
+    known: dict[str, tuple[int, int]] = {_SEED_NAME: (20, 100), _PRINTED_NAME: (20, 100)}
     known |= {f"csg-{size}-{ratio}": (size, ratio) for size, ratio in SIZES_AND_RATIOS}
     if name not in known:
         begun = [other for other in known if name and other.startswith(name)]
@@ -59,13 +68,14 @@ def _size_and_ratio(name: str) -> tuple[int, int]:
 
 def preset_names() -> tuple[str, ...]:
     """Names of all presets."""
-    return (_SEED_NAME, *(f"csg-{size}-{ratio}" for size, ratio in SIZES_AND_RATIOS))
+    return (_SEED_NAME, _PRINTED_NAME, *(f"csg-{size}-{ratio}" for size, ratio in SIZES_AND_RATIOS))
 
 
 def catalogue_figures(name: str) -> CatalogueFigures:
     """What is printed about a preset's drive, each number with its source.
 
-    The paper behind ``seed-2021`` prints rated torque and geometry; the rest is size 20, ratio 100.
+    The paper behind ``seed-2021`` prints rated torque and geometry; the rest is size 20, ratio 100. The same
+    holds for ``seed-2021-printed-roughness``.
 
     Args:
         name: name of a preset.
@@ -74,7 +84,7 @@ def catalogue_figures(name: str) -> CatalogueFigures:
         ValueError: unknown name.
     """
     figures = csg_figures(*_size_and_ratio(name))
-    if name != _SEED_NAME:
+    if name not in (_SEED_NAME, _PRINTED_NAME):
         return figures
     return replace(
         figures, name=name, rated_torque=Figure(52.0, SEED), pitch_radius=Figure(_SEED_RADIUS_M, SEED)
@@ -83,6 +93,9 @@ def catalogue_figures(name: str) -> CatalogueFigures:
 
 def preset(name: str) -> dict[str, Any]:
     """Numbers of a drive, as plain data for ``Drive``.
+
+    ``seed-2021`` has the flanks that the paper measured, with the G that its profile needs for them;
+    ``seed-2021-printed-roughness`` is the same drive with both G as printed.
 
     Args:
         name: name of a preset, e.g. ``seed-2021`` or ``csg-20-100``.
@@ -126,6 +139,7 @@ def preset(name: str) -> dict[str, Any]:
             "model": "teeth",
             "engagement": {"kind": "window", "share": 0.30},
             "tooth_bending_stiffness_n_per_m": _TOOTH_STIFFNESS_PER_WIDTH_PA * face_width,
+            **({"flanks": deepcopy(PRINTED_FLANKS)} if name == _PRINTED_NAME else {}),
         },
     }
 

@@ -24,8 +24,9 @@ def reproduce(
 ) -> None:
     """Recompute every table, figure and printed number of Zhang et al. (2021), and judge each.
 
-    reproduced: follows from the paper's equations. contradicted: does not, with the correction beside it.
-    not determined by the paper: it leaves something open.
+    reproduced: follows from the paper's equations; with a stated choice: once something is fixed that it does
+    not state. contradicted: does not follow, with the correction beside it. not determined by the paper: it
+    leaves something open.
     """
     from hdsim.reproduce.checks import compute, names
     from hdsim.reproduce.report import print_rows, to_json, write

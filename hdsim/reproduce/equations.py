@@ -228,7 +228,7 @@ def loads() -> Iterator[Row]:
         Verdict.REPRODUCED if zero == 0.0 else Verdict.CONTRADICTED,
         "follows from Eq. 12, and is a criticism of the model: "
         "unloading is elastic, so K = 0 is an artefact; it also makes the penetration, the integral of dF/K, "
-        "infinite. (The text's 'only in the plastic stage' must read elastic.)",
+        "infinite; the text's 'only in the plastic stage' must read elastic",
         "K(F) = max(K_MB(F), K_MB(F_floor)), with the bulk in series",
         {"all_plastic_force_n_at_2_3": limit},
     )

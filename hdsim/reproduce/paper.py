@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hdsim.contact.parameters import Materials
-from hdsim.surface.flank import Flank
+from hdsim.surface.flank import Flank, corrected_flank, equivalent_surface
 
 if TYPE_CHECKING:
     from hdsim.contact.asperities import AsperityStiffness
@@ -31,6 +31,8 @@ RATED_FORCE_N = 34.67
 STIFFNESS_N_PER_M = 6e7
 SECTION_4_FORCE_N = 50.0
 TEETH = 200
+#: The choice that most rows share: Eq. 1 and 15 print one frequency.
+SUM = "sum over all n"
 ENGAGED_SHARE = 0.30
 PITCH_DIAMETER_M = 0.25e-3 * TEETH
 LAG_SPACING_M = 1e-6
@@ -41,6 +43,17 @@ HEIGHT_RESOLUTION_M = 200e-9
 PLAUSIBLE_HARDNESS_PA = (2.5e9, 4.0e9)
 HARDNESS_PA = 3.0e9
 MATERIALS = Materials()
+MODULUS = f"reduced modulus {MATERIALS.reduced_modulus_pa:.4g} Pa (steel)"
+
+
+def summed() -> Flank:
+    """The pair with its structure functions added, everything as Eq. 17 and 18 print it."""
+    return equivalent_surface(CIRCULAR_SPLINE, FLEXSPLINE, constant="printed")
+
+
+def mended() -> Flank:
+    """The same measured heights with the G that Eq. 1 has for them: the pair of hdsim's default drive."""
+    return equivalent_surface(corrected_flank(CIRCULAR_SPLINE), corrected_flank(FLEXSPLINE))
 
 
 def law(

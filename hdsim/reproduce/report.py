@@ -8,7 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdsim.errors import InputError
-from hdsim.reproduce.page import CITATION, DOI, OPENING, TITLE, TONE, headlines, sections, to_html
+from hdsim.reproduce.page import (
+    CITATION,
+    DOI,
+    OPENING,
+    TITLE,
+    TONE,
+    headlines,
+    sections,
+    to_html,
+    told_choices,
+)
 from hdsim.reproduce.rows import Row, Verdict
 
 if TYPE_CHECKING:
@@ -87,6 +97,7 @@ def to_markdown(rows: list[Row], figures: dict[str, str]) -> str:
 
     lines = [f"# {TITLE}", "", f"{CITATION}, [doi:{DOI}](https://doi.org/{DOI})", "", OPENING, ""]
     lines += [f"{summary(rows)}.", "", *(f"* {cell(sentence)}" for sentence in headlines(rows)), "", TONE]
+    lines += ["", cell(told_choices(rows))] if told_choices(rows) else []
     for title, about, members in sections(rows):
         lines += ["", f"## {title}", "", *([about, ""] if about else [])]
         lines += ["| source | statement | paper | hdsim | verdict | reason | corrected | chosen |"]

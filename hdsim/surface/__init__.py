@@ -10,11 +10,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hdsim.surface.backlash import single_frequency_half_gap, sliding_half_gaps, tooth_half_gaps
     from hdsim.surface.files import read_heights
-    from hdsim.surface.flank import Flank, equivalent_surface, structure_function, structure_function_constant
+    from hdsim.surface.flank import (
+        Flank,
+        corrected_flank,
+        equivalent_surface,
+        structure_function,
+        structure_function_constant,
+    )
     from hdsim.surface.profile import random_phases, wm_profile
 
 _HOME = {
     "Flank": "flank",
+    "corrected_flank": "flank",
     "equivalent_surface": "flank",
     "structure_function": "flank",
     "structure_function_constant": "flank",
@@ -28,6 +35,7 @@ _HOME = {
 
 __all__ = [
     "Flank",
+    "corrected_flank",
     "equivalent_surface",
     "random_phases",
     "read_heights",

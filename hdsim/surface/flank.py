@@ -105,13 +105,27 @@ def flank_from_power_law(exponent: float, structure_at_1_m: float, constant: Con
     return Flank(D, math.exp(math.log(structure_at_1_m / C) / (2.0 * (D - 2.0))))
 
 
+def corrected_flank(printed: Flank) -> Flank:
+    """A flank whose G was identified with Eq. 18 as printed, with the G that Eq. 1 has for the same heights.
+
+    What was measured is the structure function; it is kept. D stays, and G falls by
+    (C_printed / C_corrected)^(1 / (2 (D - 2))).
+
+    Args:
+        printed: D, and G as identified with the printed constant.
+    """
+    return flank_from_power_law(
+        6.0 - 2.0 * printed.D, float(structure_function(1.0, printed, "printed")), "corrected"
+    )
+
+
 def equivalent_surface(
     flank1: Flank,
     flank2: Flank,
     method: EquivalentSurface = "summed",
     *,
     lags_m: tuple[float, float] = FIT_LAGS_M,
-    constant: Constant = "printed",
+    constant: Constant = "corrected",
 ) -> Flank:
     """The rough surface that, against a smooth one, stands for two rough flanks.
 
@@ -125,8 +139,8 @@ def equivalent_surface(
         flank2: the other.
         method: ``summed`` or ``averaged``.
         lags_m: shortest and longest lag of the fit, m.
-        constant: constant of the structure function, for the sum and the fit alike. The default is the one
-            by which the source identified its flanks, so that what is added is what was measured.
+        constant: constant of the structure function, for the sum and the fit alike: the one by which the
+            flanks' G were identified, so that what is added is what was measured.
 
     Returns:
         The equivalent flank.

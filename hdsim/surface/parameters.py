@@ -33,16 +33,24 @@ class FlankParameters(Parameters):
 
 
 class RoughFlanks(Parameters):
-    """The two flanks of a tooth pair, and how their roughness becomes one surface and a half-gap."""
+    """The two flanks of a tooth pair, and how their roughness becomes one surface and a half-gap.
+
+    The defaults are the flanks that Zhang et al. (2021) measured. Their Table 4 prints G as identified with
+    Eq. 18, whose constant is not that of their profile (Eq. 1); here stands the G with which Eq. 1 has the
+    measured structure functions, 5.22 and 1.62 times smaller. ``hdsim.drive.presets.PRINTED_FLANKS`` holds
+    the numbers as printed.
+    """
 
     circular_spline: FlankParameters = FlankParameters(
-        fractal_dimension=2.4272, fractal_roughness_m=1.245e-10
+        fractal_dimension=2.4272, fractal_roughness_m=2.384e-11
     )
-    """Flank of the circular spline; default: shaped, Table 4 of Zhang et al. (2021)."""
-    flexspline: FlankParameters = FlankParameters(fractal_dimension=2.643, fractal_roughness_m=1.8648e-10)
-    """Flank of the flexspline; default: hobbed, Table 4 of Zhang et al. (2021)."""
+    """Flank of the circular spline; default: shaped, Zhang et al. (2021), Table 4, G mended for Eq. 18."""
+    flexspline: FlankParameters = FlankParameters(fractal_dimension=2.643, fractal_roughness_m=1.152e-10)
+    """Flank of the flexspline; default: hobbed, Zhang et al. (2021), Table 4, G mended for Eq. 18."""
     equivalent_surface: Literal["summed", "averaged"] = "summed"
     """Two flanks as one: structure functions summed, or D and G averaged as in Zhang et al. (2021)."""
+    structure_function_constant: Literal["corrected", "printed"] = "corrected"
+    """Constant by which structure functions are summed: that of the profile, or Eq. 18 as printed."""
     backlash: Literal["full", "single"] = "full"
     """Half-gap from all frequencies with random phases, or from the single wave of Eq. 15."""
     sampling_length_m: float = Field(2.1e-3, gt=0, le=1)
@@ -61,7 +69,10 @@ class RoughFlanks(Parameters):
         from hdsim.surface.flank import equivalent_surface
 
         return equivalent_surface(
-            self.circular_spline.build(), self.flexspline.build(), self.equivalent_surface
+            self.circular_spline.build(),
+            self.flexspline.build(),
+            self.equivalent_surface,
+            constant=self.structure_function_constant,
         )
 
     def half_gaps(self, teeth: int, seed: int | list[int]) -> Array:

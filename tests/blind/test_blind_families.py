@@ -215,10 +215,14 @@ def test_strength_is_what_least_squares_leave():
 
 def test_the_gap_of_the_flanks_is_as_wide_as_it_says():
     """Heights of a Weierstrass-Mandelbrot profile scale with the gap that is asked for."""
+    from hdsim.drive.presets import PRINTED_FLANKS
     from hdsim.surface.parameters import RoughFlanks
 
     drive = draw_drive(np.random.default_rng(0), arm=False)
-    nominal = RoughFlanks(seed=3).half_gaps(200, 0).mean()
+    nominal = RoughFlanks.model_validate(PRINTED_FLANKS | {"seed": 3}).half_gaps(200, 0).mean()
+    # What the kept cases were drawn with, whatever the default drive's flanks are.
+    assert nominal == pytest.approx(1.42e-6, rel=0.06)
+    assert Teeth("teeth", "static", 1.0, 3).section(drive)["flanks"] == PRINTED_FLANKS | {"seed": 3}
     for gap in (0.5, 1.0, 3.0):
         section = Teeth("teeth", "static", gap, 3).section(drive)["flanks"]
         assert RoughFlanks(**section).half_gaps(200, 0).mean() == pytest.approx(gap * nominal, rel=0.15)

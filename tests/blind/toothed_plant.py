@@ -16,6 +16,7 @@ from moving import motion
 import hdsim
 from hdsim.contact.law import ValidityWarning
 from hdsim.drive.parameters import RESOLVED_RAD_PER_S
+from hdsim.drive.presets import PRINTED_FLANKS
 from hdsim.scenario.writer import to_yaml
 
 #: Time for which the drive stands before its log begins, s.
@@ -31,7 +32,10 @@ Effects = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class Teeth:
-    """The mesh of a plant: model, ring, half-gaps over the nominal ones (0: no gap), its flanks' seed."""
+    """The mesh of a plant: model, ring, half-gaps over the nominal ones (0: no gap), its flanks' seed.
+
+    Nominal are the gaps of ``seed-2021-printed-roughness``: twice the default drive's.
+    """
 
     model: str
     ring: str
@@ -51,12 +55,10 @@ class Teeth:
                 "contact": {"law": "constant", "contact_stiffness_n_per_m": 6e9 * radius},
             }
         # Heights of a Weierstrass-Mandelbrot profile go with G^(D - 2).
-        flanks: dict[str, Any] = {"seed": self.seed}
-        for name, dimension, roughness in (
-            ("circular_spline", 2.4272, 1.245e-10),
-            ("flexspline", 2.643, 1.8648e-10),
-        ):
-            scaled = roughness * self.gap ** (1 / (dimension - 2))
+        flanks: dict[str, Any] = PRINTED_FLANKS | {"seed": self.seed}
+        for name in ("circular_spline", "flexspline"):
+            dimension = flanks[name]["fractal_dimension"]
+            scaled = flanks[name]["fractal_roughness_m"] * self.gap ** (1 / (dimension - 2))
             flanks[name] = {"fractal_dimension": dimension, "fractal_roughness_m": scaled}
         return mesh | {"flanks": flanks}
 

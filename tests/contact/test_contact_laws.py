@@ -17,7 +17,9 @@ from hdsim.contact import (
     tabulate,
 )
 from hdsim.contact.law import ContactLaw
+from hdsim.contact.parameters import MajumdarBhushanParameters, Materials
 from hdsim.errors import InputError
+from hdsim.surface.parameters import RoughFlanks
 
 SUMMED = {"D": 2.430, "G_m": 1.364e-10, "reduced_modulus_pa": 1.154e11, "poisson_ratio": 0.3}
 AVERAGED = SUMMED | {"D": 2.5351, "G_m": 1.55e-10}
@@ -144,6 +146,21 @@ def test_the_averaged_pair_is_an_order_stiffer_than_the_paper_prints(hardness, l
 def test_the_summed_pair_reaches_the_printed_stiffness(hardness, low, high):
     law = MajumdarBhushan(**SUMMED, hardness_pa=hardness, floor_force_n=7.0)
     assert low < law.stiffness_at_force(34.67) < high
+
+
+@pytest.mark.parametrize(("hardness", "stiffness"), [(2.5e9, 3.7e8), (3.0e9, 4.7e8), (4.0e9, 6.7e8)])
+def test_the_default_pair_is_stiffer_than_the_paper_prints(hardness, stiffness):
+    # docs/contact.md; the measured heights with the G of Eq. 1.
+    surface, steels = RoughFlanks().equivalent(), Materials()
+    law = MajumdarBhushan(
+        surface.D, surface.G_m, steels.reduced_modulus_pa, hardness, steels.softer.poisson_ratio
+    )
+    assert law.stiffness_at_force(34.67) == pytest.approx(stiffness, rel=0.01)
+    default = MajumdarBhushanParameters().build(surface)
+    assert isinstance(default, MajumdarBhushan)
+    assert default.stiffness_at_force(34.67) == pytest.approx(4.7e8, rel=0.01)
+    assert default.all_plastic_force_n == pytest.approx(0.075, rel=0.02)
+    assert default.area_bound_force_n == pytest.approx(950, rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["summed", "averaged", "hertz-asperities", "D = 2.5"])

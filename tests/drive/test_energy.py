@@ -17,8 +17,9 @@ from hdsim.simulation.setup import build_run
 TURNS = 100
 SPEED = 600.0  # rad/s
 
+# Softer contacts than the default drive's: the same balance, with a slower ringing, in a quarter of the time.
 LOSSLESS: dict[str, Any] = {
-    "preset": "seed-2021",
+    "preset": "seed-2021-printed-roughness",
     "friction": {"coulomb_nm": 0.0, "viscous_nm_s_per_rad": 0.0, "load_coefficient": 0.0},
     "torsion": {"damping_nm_s_per_rad": 0.0},
 }

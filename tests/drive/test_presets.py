@@ -64,6 +64,40 @@ def test_seed_drive_as_printed():
     )
 
 
+def test_only_one_preset_has_the_roughness_as_printed():
+    from hdsim.drive.parameters import Drive
+    from hdsim.surface.parameters import RoughFlanks
+
+    default = RoughFlanks()
+    for name in preset_names():
+        for model in ("teeth", "tabulated"):
+            flanks = Drive.model_validate({"preset": name, "mesh": {"model": model}}).mesh.flanks
+            assert (flanks == default) == (name != "seed-2021-printed-roughness"), (name, model)
+    printed = preset("seed-2021-printed-roughness")
+    assert flanks_of(printed, "circular_spline") == (2.4272, 1.245e-10)
+    assert flanks_of(printed, "flexspline") == (2.643, 1.8648e-10)
+    # Nothing else differs from the seed drive.
+    del printed["mesh"]["flanks"]
+    assert printed == preset("seed-2021")
+    assert vars(catalogue_figures("seed-2021-printed-roughness")) == vars(catalogue_figures("seed-2021")) | {
+        "name": "seed-2021-printed-roughness"
+    }
+
+
+def flanks_of(data, name):
+    flank = data["mesh"]["flanks"][name]
+    return flank["fractal_dimension"], flank["fractal_roughness_m"]
+
+
+def test_a_table_of_the_teeth_is_made_from_the_presets_own():
+    from hdsim.drive.parameters import Drive
+
+    teeth = Drive.model_validate({"preset": "csg-14-100"}).mesh.model_dump(exclude={"model"})
+    table = Drive.model_validate({"preset": "csg-14-100", "mesh": {"model": "tabulated"}}).mesh.model_dump()
+    assert table | teeth == table
+    assert teeth["tooth_bending_stiffness_n_per_m"] == pytest.approx(14e9 * 0.4 * 1.27e-3 * 14)
+
+
 def test_stiffness_table_of_the_maker():
     # CHA manual 1018854, p. 54: K3, K2, K1 in 1e3 N m/rad; columns size 14, 17, 20, 25 times ratio 50, > 50
     rows = {

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
 
+from hdsim.drive.presets import PRINTED_FLANKS
 from hdsim.errors import InputError
 from hdsim.surface import (
     Flank,
+    corrected_flank,
     equivalent_surface,
     random_phases,
     single_frequency_half_gap,
@@ -74,6 +76,20 @@ def test_a_sliding_half_gap_follows_the_profile_without_its_unresolved_waves():
     np.testing.assert_allclose(fine.mean(axis=1), tooth_half_gaps(flank, 30, 2), rtol=0.15)
     with pytest.raises(InputError):
         sliding_half_gaps(flank, 3, 1, 0)
+
+
+def test_the_default_flanks_are_the_measured_ones_with_the_g_of_eq_1():
+    flanks, printed = RoughFlanks(), RoughFlanks.model_validate(PRINTED_FLANKS)
+    for name in ("circular_spline", "flexspline"):
+        right = corrected_flank(getattr(printed, name).build())
+        assert getattr(flanks, name).fractal_dimension == right.D
+        assert getattr(flanks, name).fractal_roughness_m == pytest.approx(right.G_m, rel=5e-4)
+    # 0.70 and 1.42 um, docs/surface.md; from one tooth to another a third of that.
+    assert flanks.half_gaps(4000, 1).mean() == pytest.approx(0.704e-6, rel=0.01)
+    assert printed.half_gaps(4000, 1).mean() == pytest.approx(1.420e-6, rel=0.01)
+    assert printed.equivalent() == equivalent_surface(
+        Flank(2.4272, 1.245e-10), Flank(2.643, 1.8648e-10), constant="printed"
+    )
 
 
 def test_the_scenario_models_build_what_the_functions_give():

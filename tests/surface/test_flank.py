@@ -7,8 +7,15 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from hdsim.errors import InputError
-from hdsim.surface import Flank, equivalent_surface, structure_function, structure_function_constant
+from hdsim.surface import (
+    Flank,
+    corrected_flank,
+    equivalent_surface,
+    structure_function,
+    structure_function_constant,
+)
 from hdsim.surface.flank import flank_from_power_law
+from hdsim.surface.sampled import measured_structure_function, synthetic_profiles
 
 CS = Flank(2.4272, 1.245e-10)
 FS = Flank(2.643, 1.8648e-10)
@@ -52,12 +59,34 @@ def test_a_flank_survives_its_own_structure_function(D, log_g, constant):
 
 
 def test_the_pair_of_the_paper():
-    summed = equivalent_surface(CS, FS)
+    summed = equivalent_surface(CS, FS, constant="printed")
     assert pytest.approx(2.430, abs=5e-4) == summed.D
     assert summed.G_m == pytest.approx(1.36e-10, abs=1e-12)
     averaged = equivalent_surface(CS, FS, "averaged")
     assert pytest.approx(2.5351, abs=1e-12) == averaged.D
     assert averaged.G_m == pytest.approx(1.55e-10, abs=1e-12)
+
+
+@pytest.mark.parametrize(("flank", "times"), [(CS, 5.22), (FS, 1.62)])
+def test_a_corrected_flank_has_the_heights_that_were_measured(flank, times):
+    corrected = corrected_flank(flank)
+    assert pytest.approx(flank.D, abs=1e-12) == corrected.D
+    Ds = flank.D - 1
+    shift = 0.5 * (2 * math.pi) ** (4 - 2 * Ds)  # of the constants
+    assert flank.G_m / corrected.G_m == pytest.approx(shift ** (1 / (2 * (Ds - 1))), rel=1e-9)
+    assert flank.G_m / corrected.G_m == pytest.approx(times, rel=2e-3)
+    # Eq. 1 with the corrected G, sampled, gives the structure function that Eq. 18's G was read from.
+    steps = np.array([1, 3, 10, 30, 100])
+    z = np.concatenate([synthetic_profiles(corrected, 25, 2001, 1e-6, [seed, 7]) for seed in range(8)])
+    sampled = measured_structure_function(z, steps).mean(axis=0)
+    np.testing.assert_allclose(sampled, structure_function(steps * 1e-6, flank, "printed"), rtol=0.1)
+
+
+def test_correcting_and_summing_may_be_done_in_either_order():
+    first = equivalent_surface(corrected_flank(CS), corrected_flank(FS))
+    last = corrected_flank(equivalent_surface(CS, FS, constant="printed"))
+    assert pytest.approx(last.D, abs=1e-9) == first.D
+    assert first.G_m == pytest.approx(last.G_m, rel=1e-6)
 
 
 @pytest.mark.parametrize("constant", ["printed", "corrected"])
@@ -71,7 +100,7 @@ def test_the_summed_surface_has_the_summed_structure_function(constant):
 def test_two_like_flanks_double_the_structure_function():
     twice = equivalent_surface(CS, CS)
     assert pytest.approx(CS.D, abs=1e-12) == twice.D
-    assert twice.G_m == pytest.approx(CS.G_m * 2 ** (1 / (2 * (CS.D - 2))), rel=1e-10)
+    assert twice.G_m == pytest.approx(CS.G_m * 2 ** (1 / (2 * (CS.D - 2))), rel=1e-9)
 
 
 def test_what_is_no_flank_is_refused():
