@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "presets": ("hdsim.study.commands:presets", "List the drives that are ready to use."),
     "catalogue": ("hdsim.study.commands:catalogue", "Simulate a preset's catalogue lines; print the errors."),
     "bench": ("hdsim.study.commands:bench", "Measure a drive as a test bench does, beside its catalogue."),
+    "select": ("hdsim.study.commands_select:select", "Find the size that carries a load cycle."),
     "study": ("hdsim.study.commands_engine:study", "Run a study: parameters, replicates, metrics."),
     "budget": ("hdsim.study.commands_engine:budget", "Split a positioning error into its causes."),
     "tolerance": (

@@ -1,46 +1,20 @@
 """What makers print about strain-wave gears, number by number, each with where it was read.
 
-Ratings are those of the CSG series (cup type, high torque) in sizes 14, 17, 20 and 25. Figures that belong to
-the size and the ratio rather than to the series (stiffness, accuracy) come from the same maker's actuators
-with these gears. A number that no source gives is None: nothing is filled in here; ``hdsim.drive.presets``
-does the estimating.
+Sizes 14, 17, 20 and 25 of the CSG series (cup type, high torque), whose ratings stand with those of other
+sizes and series in ``hdsim.drive.ratings``. Figures that belong to the size and the ratio rather than to the
+series (stiffness, accuracy) come from the same maker's actuators with these gears. A number that no source
+gives is None: nothing is filled in here; ``hdsim.drive.presets`` does the estimating.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
-Confidence = Literal["read", "copied", "quoted"]
-"""How a number came here: ``read`` on the maker's or author's own page; ``copied`` from somebody else's copy
-of the maker's page, which was read; ``quoted`` as commonly quoted from the catalogue, not read again."""
-
-ARCMIN = 2.908882086657216e-4
-"""One minute of arc, rad."""
+from hdsim.drive.printed import ARCMIN, Figure, Source
+from hdsim.drive.ratings import GEAR_DB, rated_gears, ratings
 
 SIZES = (14, 17, 20, 25)
 """Sizes with stiffness, friction and inertia on record."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where a number was found.
-
-    Args:
-        citation: document, page or table.
-        confidence: how directly it was seen.
-    """
-
-    citation: str
-    confidence: Confidence
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A number in SI units with its source."""
-
-    value: float
-    source: Source
 
 
 @dataclass(frozen=True)
@@ -71,6 +45,7 @@ class CatalogueFigures:
     repeated_peak_torque: Figure | None
     momentary_peak_torque: Figure | None
     ratcheting_torque: Figure | None
+    buckling_torque: Figure | None
     torque_t1: Figure
     torque_t2: Figure
     stiffness_k1: Figure
@@ -102,21 +77,10 @@ CPL = Source(
     "copied",
 )
 TPI_RADIUS = Source("Schaeffler TPI 275, pitch radius; zhulu248/harmonic-drive-twin catalogue.py", "copied")
-RATCHETING = Source("Harmonic Drive LLC, CSF/CSG catalogue, p. 14, not re-read", "quoted")
 INERTIA_COMPONENT = Source(
     "Harmonic Drive LLC, CSF rating table, moment of inertia; row copied in a public table-extraction test",
     "copied",
 )
-GEAR_DB = Source(
-    "Harmonic Drive CSG and SHG (same ratings) data; copied, naming no document, in a robot model's gear_db",
-    "copied",
-)
-PRODUCT_PAGE = Source(
-    "harmonicdrive.net, CSG-2UH product page of this size and ratio; copied, with the link, in a repository",
-    "copied",
-)
-PROJECT = Source("Harmonic Drive CSG data of this size and ratio; copied in a public robot project", "copied")
-QUOTED = Source("Harmonic Drive LLC, CSF/CSG catalogue, CSG rating table (p. 10), not re-read", "quoted")
 
 _STIFFNESS_LIMITS = {14: (2.0, 6.9), 17: (3.9, 12.0), 20: (7.0, 25.0), 25: (14.0, 48.0)}
 _STIFFNESS_50 = {
@@ -146,34 +110,7 @@ _INERTIA = {
 }
 _RADIUS_MM = {14: 17.78, 17: 21.59, 20: 25.40, 25: 31.75}
 
-# Rated, average, repeated peak, momentary peak torque in N m, each with its source. Where the copied gear_db
-# contradicts itself or the catalogue as quoted, the value that fits the quoted one is taken: momentary peaks
-# of 17-50 (127 there, which is size 20), 17-100 (109 for CSG, 143 for SHG) and 17-120 (143 for SHG), average
-# torque of 17-80 (38 for CSG, 39.93 for SHG), peaks of 14-100 (the same as 14-80 there).
-_P, _C, _R, _Q = PRODUCT_PAGE, GEAR_DB, PROJECT, QUOTED
-_RATINGS: dict[tuple[int, int], tuple[tuple[float, Source], ...]] = {
-    (14, 50): ((7.0, _Q), (9.0, _Q), (23.0, _Q), (46.0, _Q)),
-    (14, 80): ((10.0, _C), (14.0, _C), (30.0, _C), (61.0, _C)),
-    (14, 100): ((10.0, _C), (14.0, _C), (36.0, _Q), (70.0, _Q)),
-    (17, 50): ((21.0, _C), (34.0, _C), (44.0, _C), (91.0, _Q)),
-    (17, 80): ((29.0, _C), (35.0, _Q), (56.0, _C), (113.0, _C)),
-    (17, 100): ((31.0, _C), (51.0, _C), (70.0, _C), (143.0, _C)),
-    (17, 120): ((31.0, _C), (51.0, _C), (70.0, _C), (112.0, _Q)),
-    (20, 50): ((33.0, _C), (44.0, _C), (73.0, _C), (127.0, _C)),
-    (20, 80): ((44.0, _Q), (61.0, _Q), (96.0, _Q), (165.0, _Q)),
-    (20, 100): ((52.0, _P), (64.0, _P), (107.0, _P), (191.0, _P)),
-    (20, 120): ((52.0, _Q), (64.0, _Q), (113.0, _Q), (191.0, _Q)),
-    (20, 160): ((52.0, _R), (64.0, _Q), (120.0, _R), (191.0, _R)),
-    (25, 50): ((51.0, _P), (72.0, _P), (127.0, _P), (242.0, _P)),
-    (25, 80): ((82.0, _Q), (113.0, _Q), (178.0, _Q), (332.0, _R)),
-    (25, 100): ((87.0, _R), (140.0, _Q), (204.0, _R), (369.0, _R)),
-    (25, 120): ((87.0, _Q), (140.0, _Q), (217.0, _Q), (395.0, _Q)),
-    (25, 160): ((87.0, _Q), (140.0, _Q), (229.0, _Q), (408.0, _Q)),
-}
-
-_RATCHETING = {(20, 100): 330.0}
-
-SIZES_AND_RATIOS = tuple(_RATINGS)
+SIZES_AND_RATIOS = tuple((one.size, one.ratio) for one in rated_gears("csg") if one.size in SIZES)
 """The (size, ratio) pairs of the CSG series with ratings on record."""
 
 
@@ -207,21 +144,23 @@ def csg_figures(size: int, ratio: int) -> CatalogueFigures:
     Raises:
         KeyError: no ratings on record for this size and ratio.
     """
-    rated, average, repeated, momentary = (Figure(*cell) for cell in _RATINGS[size, ratio])
+    limits = ratings(f"csg-{size}-{ratio}")
+    if size not in SIZES or limits.rated_torque is None:
+        raise KeyError(f"csg-{size}-{ratio}")
     column = 0 if ratio == 50 else 1
     k1, k2, k3 = (_STIFFNESS_50 if ratio == 50 else _STIFFNESS_ABOVE)[size]
     t1, t2 = _STIFFNESS_LIMITS[size]
-    ratcheting = _RATCHETING.get((size, ratio))
     friction = friction_figures(size) if ratio == 100 else None
     return CatalogueFigures(
         name=f"csg-{size}-{ratio}",
         size=size,
         ratio=ratio,
-        rated_torque=rated,
-        average_torque=average,
-        repeated_peak_torque=repeated,
-        momentary_peak_torque=momentary,
-        ratcheting_torque=None if ratcheting is None else Figure(ratcheting, RATCHETING),
+        rated_torque=limits.rated_torque,
+        average_torque=limits.average_torque,
+        repeated_peak_torque=limits.repeated_peak_torque,
+        momentary_peak_torque=limits.momentary_peak_torque,
+        ratcheting_torque=limits.ratcheting_torque,
+        buckling_torque=limits.buckling_torque,
         torque_t1=Figure(t1, CHA),
         torque_t2=Figure(t2, CHA),
         stiffness_k1=Figure(k1, CHA),

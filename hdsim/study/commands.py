@@ -74,8 +74,8 @@ def presets(name: str | None) -> None:
     from rich.table import Table
 
     from hdsim.console import console
-    from hdsim.drive.catalogue import Figure
     from hdsim.drive.presets import catalogue_figures, preset_names
+    from hdsim.drive.printed import Figure
     from hdsim.errors import InputError
 
     if name is not None:

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hdsim.drive.catalogue import ARCMIN, SIZES_AND_RATIOS, Figure
+from hdsim.drive.catalogue import SIZES_AND_RATIOS
 from hdsim.drive.presets import catalogue_figures, friction_from_catalogue, preset, preset_names
+from hdsim.drive.printed import ARCMIN, Figure
 from hdsim.errors import PhysicsError
 
 SIZES = (14, 17, 20, 25)
