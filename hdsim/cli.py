@@ -31,6 +31,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "Linearise a drive; its modes and Bode plot.",
     ),
     "reproduce": ("hdsim.reproduce.commands:reproduce", "Recompute every number of the source paper."),
+    "validate": (
+        "hdsim.validate.commands:validate",
+        "Hold hdsim against printed, measured and independent values.",
+    ),
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),

@@ -99,8 +99,6 @@ _SMALL: dict[tuple[int, int], tuple[tuple[float, Source], ...]] = {
     (25, 160): ((87.0, _S), (140.0, _S), (229.0, _S), (408.0, _S)),
 }
 
-_RATCHETING = {(20, 100): 330.0}
-
 RATIOS = (50, 80, 100, 120, 160)
 
 # Rated, average, repeated peak, momentary peak torque, N m, of CSG and SHG from size 32 on, which are alike.
