@@ -45,6 +45,27 @@ def average_torque(
     return float(np.sum(travel * np.abs(torque_nm) ** 3) / total) ** (1.0 / 3.0) if total > 0.0 else 0.0
 
 
+def bearing_averages(
+    time_s: NDArray[np.float64], torque_nm: NDArray[np.float64], speed: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Duration, travel and travel weighed by the cubed torque of a sampled motion, by the trapezoidal rule.
+
+    Args:
+        time_s: shape (n,), s.
+        torque_nm: at the output, shape (n,), N m.
+        speed: of the wave generator, shape (n,), rad/s.
+
+    Returns:
+        s, rad and rad (N m)^3; T_av is the cube root of the third over the second.
+    """
+    travel = np.abs(speed)
+    return (
+        float(time_s[-1] - time_s[0]),
+        float(np.trapezoid(travel, time_s)),
+        float(np.trapezoid(travel * np.abs(torque_nm) ** 3, time_s)),
+    )
+
+
 @dataclass(frozen=True)
 class Stop:
     """An emergency stop or a collision.

@@ -42,8 +42,8 @@ def summary(rows: list[Row]) -> str:
     apart = Counter(row.verdict for row in rows if not row.fitted)
     absent = f", the data of {count[Verdict.ABSENT]} are absent" if count[Verdict.ABSENT] else ""
     return (
-        f"{count[Verdict.HOLDS]} of {len(rows)} rows hold, {count[Verdict.FAILS]} fail{absent}; of those that set "
-        f"no number of the model {apart[Verdict.HOLDS]} hold and {apart[Verdict.FAILS]} fail"
+        f"{count[Verdict.HOLDS]} of {len(rows)} rows hold, {count[Verdict.FAILS]} fail{absent}; of those "
+        f"that set no number of the model {apart[Verdict.HOLDS]} hold and {apart[Verdict.FAILS]} fail"
     )
 
 
@@ -108,10 +108,14 @@ def to_markdown(rows: list[Row]) -> str:
             f"{allowed(row)}: {row.because}", verdict,
         )  # fmt: skip
         lines.append(f"| {' | '.join(cell.replace('|', ' ') for cell in cells)} |")
-    lines += ["", f"{summary(rows)[:1].upper()}{summary(rows)[1:]}."]
-    remarks = [
-        f"* {row.quantity}: {row.remark}." for row in rows if row.remark and row.verdict == Verdict.FAILS
-    ]
-    if remarks:
-        lines += ["", "Of those that fail:", "", *remarks]
+    lines += ["", f"{summary(rows)}."]
+    failing = [row for row in rows if row.remark and row.verdict == Verdict.FAILS]
+    if failing:
+        about: dict[str, list[str]] = {}
+        for row in failing:
+            about.setdefault(row.remark, []).append(row.name)
+        lines += ["", "About those that fail:", ""]
+        lines += [
+            f"* {', '.join(f'`{name}`' for name in members)}: {text}." for text, members in about.items()
+        ]
     return "\n".join(lines) + "\n"

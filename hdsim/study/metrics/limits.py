@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.drive.duty import PROCEDURE, average_torque
-from hdsim.drive.ratings import Ratings, bearing_life_h, ratings
+from hdsim.drive.duty import PROCEDURE, bearing_averages
+from hdsim.drive.ratings import Ratings, bearing_life_h, ratings_of_preset
 from hdsim.errors import InputError
 from hdsim.recording import Recording
 from hdsim.study.registry import metric
@@ -24,37 +24,36 @@ def gear_of(scenario: Scenario) -> Ratings:
     """The ratings of a scenario's drive.
 
     Raises:
-        InputError: the drive is no preset, so that nothing is printed about it.
+        InputError: nothing is printed about the drive.
     """
     preset = scenario.drive.preset
-    if preset is None:
-        raise InputError("this metric needs the catalogue's limits; the drive has no preset")
-    return ratings("csg-20-100" if preset == "seed-2021" else preset)
+    gear = None if preset is None else ratings_of_preset(preset)
+    if gear is None:
+        raise InputError("this metric needs the catalogue's limits; the drive is no preset")
+    return gear
 
 
-def _average_torque_nm(recording: Recording) -> float:
-    steps = np.gradient(recording.time) if len(recording.time) > 1 else np.ones(1)
-    return average_torque(recording["output_torque"], recording["motor_velocity"], steps)
-
-
-def _average_input_speed_rpm(recording: Recording) -> float:
-    time = recording.time
-    if len(time) < 2:
-        raise InputError("an average speed needs two samples")
-    turned = float(np.trapezoid(np.abs(recording["motor_velocity"]), time))
-    return turned / float(time[-1] - time[0]) * 30.0 / math.pi
+def _averages(recording: Recording) -> tuple[float, float]:
+    """Cubic mean of the output torque in N m, and mean input speed in rpm; 0 where nothing turns."""
+    if len(recording.time) < 2:
+        raise InputError("an average needs two samples")
+    duration, travel, cubed = bearing_averages(
+        recording.time, recording["output_torque"], recording["motor_velocity"]
+    )
+    torque = (cubed / travel) ** (1.0 / 3.0) if travel > 0.0 else 0.0
+    return torque, travel / duration * 30.0 / math.pi
 
 
 @metric("average_load_torque", "N m", "cubic mean of the output torque, weighed by the speed", PROCEDURE)
 def average_load_torque(recording: Recording, scenario: Scenario) -> float:
     """Cubic mean of the transmitted torque over the run, N m; 0 where nothing turns."""
-    return _average_torque_nm(recording)
+    return _averages(recording)[0]
 
 
 @metric("average_input_speed", "rpm", "mean of the wave generator's absolute speed over the run", PROCEDURE)
 def average_input_speed(recording: Recording, scenario: Scenario) -> float:
     """Mean absolute speed, rpm."""
-    return _average_input_speed_rpm(recording)
+    return _averages(recording)[1]
 
 
 @metric(
@@ -65,8 +64,7 @@ def average_input_speed(recording: Recording, scenario: Scenario) -> float:
 )
 def bearing_life(recording: Recording, scenario: Scenario) -> float:
     """Hours of such work that nine of ten bearings survive."""
-    gear = gear_of(scenario)
-    return bearing_life_h(gear, _average_torque_nm(recording), _average_input_speed_rpm(recording))
+    return bearing_life_h(gear_of(scenario), *_averages(recording))
 
 
 def _distance(recording: Recording, scenario: Scenario, name: str, figure: Figure | None) -> float:
