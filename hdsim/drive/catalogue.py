@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hdsim.drive.printed import ARCMIN, Figure, Source
-from hdsim.drive.ratings import GEAR_DB, rated_gears, ratings
+from hdsim.drive.printed import Figure, Source
+from hdsim.drive.printed_gear import printed_gear
+from hdsim.drive.ratings import rated_gears, ratings
 
 SIZES = (14, 17, 20, 25)
 """Sizes with stiffness, friction and inertia on record."""
@@ -68,7 +69,6 @@ SEED = Source(
     "section 4.3 (rated torque)",
     "read",
 )
-CHA = Source("Harmonic Drive AG, CHA manual 1018854 08/2018 V03, p. 54, Tables 54.1 and 54.3", "read")
 TPI = Source(
     "Schaeffler TPI 275, series RT1-H-CS, i = 100, 20 °C; zhulu248/harmonic-drive-twin catalogue.py", "copied"
 )
@@ -77,37 +77,11 @@ CPL = Source(
     "copied",
 )
 TPI_RADIUS = Source("Schaeffler TPI 275, pitch radius; zhulu248/harmonic-drive-twin catalogue.py", "copied")
-INERTIA_COMPONENT = Source(
-    "Harmonic Drive LLC, CSF rating table, moment of inertia; row copied in a public table-extraction test",
-    "copied",
-)
-
-_STIFFNESS_LIMITS = {14: (2.0, 6.9), 17: (3.9, 12.0), 20: (7.0, 25.0), 25: (14.0, 48.0)}
-_STIFFNESS_50 = {
-    14: (3.4e3, 4.7e3, 5.7e3),
-    17: (8.1e3, 11e3, 13e3),
-    20: (13e3, 18e3, 23e3),
-    25: (25e3, 34e3, 44e3),
-}
-_STIFFNESS_ABOVE = {
-    14: (4.7e3, 6.1e3, 7.1e3),
-    17: (10e3, 14e3, 16e3),
-    20: (16e3, 25e3, 29e3),
-    25: (31e3, 50e3, 57e3),
-}
-_ACCURACY_ARCMIN = {14: (1.2, 1.0), 17: (1.2, 1.0), 20: (1.0, 0.8), 25: (1.0, 0.8)}  # ratio 50, above 50
-
 _STARTING = {14: 21e-3, 17: 29e-3, 20: 37e-3, 25: 69e-3}
 _RUNNING_2000 = {14: 35e-3, 17: 51e-3, 20: 105e-3, 25: 195e-3}
 _BACK_DRIVING = {14: 2.21, 17: 3.06, 20: 3.89, 25: 7.26}
 _EFFICIENCY = {14: 0.67, 17: 0.77, 20: 0.77, 25: 0.77}
 
-_INERTIA = {
-    14: (0.033e-4, INERTIA_COMPONENT),
-    17: (0.079e-4, INERTIA_COMPONENT),
-    20: (0.193e-4, GEAR_DB),
-    25: (0.413e-4, GEAR_DB),
-}
 _RADIUS_MM = {14: 17.78, 17: 21.59, 20: 25.40, 25: 31.75}
 
 SIZES_AND_RATIOS = tuple((one.size, one.ratio) for one in rated_gears("csg") if one.size in SIZES)
@@ -147,9 +121,6 @@ def csg_figures(size: int, ratio: int) -> CatalogueFigures:
     limits = ratings(f"csg-{size}-{ratio}")
     if size not in SIZES or limits.rated_torque is None:
         raise KeyError(f"csg-{size}-{ratio}")
-    column = 0 if ratio == 50 else 1
-    k1, k2, k3 = (_STIFFNESS_50 if ratio == 50 else _STIFFNESS_ABOVE)[size]
-    t1, t2 = _STIFFNESS_LIMITS[size]
     friction = friction_figures(size) if ratio == 100 else None
     return CatalogueFigures(
         name=f"csg-{size}-{ratio}",
@@ -161,19 +132,10 @@ def csg_figures(size: int, ratio: int) -> CatalogueFigures:
         momentary_peak_torque=limits.momentary_peak_torque,
         ratcheting_torque=limits.ratcheting_torque,
         buckling_torque=limits.buckling_torque,
-        torque_t1=Figure(t1, CHA),
-        torque_t2=Figure(t2, CHA),
-        stiffness_k1=Figure(k1, CHA),
-        stiffness_k2=Figure(k2, CHA),
-        stiffness_k3=Figure(k3, CHA),
         input_starting_torque=friction.input_starting_torque if friction else None,
         running_torque=friction.running_torque if friction else (),
         back_driving_torque=friction.back_driving_torque if friction else None,
         efficiency=friction.efficiency if friction else None,
-        hysteresis_loss=Figure(ARCMIN, CHA),
-        lost_motion=Figure(ARCMIN, CHA),
-        accuracy=Figure(_ACCURACY_ARCMIN[size][column] * ARCMIN, CHA),
-        repeatability=Figure(0.1 * ARCMIN, CHA),
-        wave_generator_inertia=Figure(*_INERTIA[size]),
         pitch_radius=Figure(_RADIUS_MM[size] * 1e-3, TPI_RADIUS),
+        **printed_gear(size, ratio),
     )

@@ -79,6 +79,7 @@ def presets(name: str | None) -> None:
     from hdsim.console import console
     from hdsim.drive.presets import catalogue_figures, preset_names
     from hdsim.drive.printed import Figure
+    from hdsim.drive.printed_gear import printed_gear
     from hdsim.drive.ratings import ratings_of_preset
     from hdsim.errors import InputError
 
@@ -91,7 +92,10 @@ def presets(name: str | None) -> None:
         table = Table(
             "quantity", "value", "seen", "source", title=f"Printed about {name}, SI units but rpm and h"
         )
-        printed = (vars(limits) if limits else {}) | (vars(figures) if figures else {})
+        gear = printed_gear(limits.size, limits.ratio) if limits else {}
+        if limits and limits.series == "shg":
+            del gear["wave_generator_inertia"]  # the hat type's, with its hollow shaft, is another one
+        printed = (vars(limits) if limits else {}) | gear | (vars(figures) if figures else {})
         for field, value in printed.items():
             if isinstance(value, Figure):
                 table.add_row(

@@ -109,6 +109,24 @@ def test_the_command_prints_margins_reasons_and_the_smallest(capsys: pytest.Capt
     assert next(gear["gear"] for gear in found["gears"] if gear["carries"]) == "csg-25-100"
 
 
+def test_the_load_cycle_in_the_documentation_is_one(tmp_path: Path) -> None:
+    page = (FOLDER.parents[1] / "docs" / "selection.md").read_text(encoding="utf-8")
+    path = tmp_path / "cycle.yaml"
+    path.write_text(page.split("```yaml\n")[1].split("```")[0], encoding="utf-8")
+    assert load_cycle(path).name == "pick and place"
+
+
+@pytest.mark.parametrize("name", ["csg-20-100", "seed-2021", "csg-65-160", "shg-32-100", "csf-40-120"])
+def test_what_is_printed_of_a_gear_is_listed_with_how_it_was_seen(
+    capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    code, out, _ = run(capsys, "presets", name)
+    assert code == 0
+    assert "stiffness k1" in out
+    assert ("maximum input speed" in out) == (not name.startswith("csf"))
+    assert ("inertia" in out) == (not name.startswith("shg"))
+
+
 def test_nothing_carries_too_much(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "cycle.yaml"
     path.write_text("phases: [{torque_nm: 1.0e5, speed_rpm: 1, duration_s: 1}]\n", encoding="utf-8")
