@@ -145,22 +145,21 @@ def average_torque_of_the_example(_: Path | None) -> Iterator[Row]:
 def bearing_life(_: Path | None) -> Iterator[Row]:
     """Life of the wave-generator bearing from simulated runs at 2000 rpm."""
     from hdsim.drive.parameters import Drive
-    from hdsim.study.bench._scenario import bench
+    from hdsim.scenario import Scenario
     from hdsim.study.catalogue import lumped, measured
 
     made = Drive.model_validate(lumped(_PRESET))
 
     def life(share: float) -> float:
         move = {"type": "ramp", "velocity_rpm": math.copysign(2000.0, made.ratio)}
-        scenario = bench(
-            lumped(_PRESET),
-            {"type": "motion", "trajectory": move},
+        load = {"type": "hold", "torque_nm": -share * made.rated_torque_nm}
+        scenario = Scenario.model_validate(
             {
-                "inertia_kg_m2": 0.05,
-                "torque": {"type": "hold", "torque_nm": -share * made.rated_torque_nm},
-            },
-            {"duration_s": 5.0},
-            name="at one speed and load",
+                "drive": lumped(_PRESET),
+                "command": {"motor": {"type": "motion", "trajectory": move}},
+                "load": {"inertia_kg_m2": 0.05, "torque": load},
+                "run": {"duration_s": 5.0},
+            }
         )
         return measured("bearing_life", scenario)
 

@@ -64,7 +64,7 @@ def print_rows(rows: list[Row], console: Console | None = None) -> None:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     for row in rows:
-        fitted = " (set a number)" if row.fitted else ""
+        fitted = " *" if row.fitted else ""
         table.add_row(
             row.name, row.quantity + fitted, number(row.stated), number(row.computed), row.unit,
             deviation(row),
@@ -77,6 +77,8 @@ def print_rows(rows: list[Row], console: Console | None = None) -> None:
         about.setdefault(f"{row.source}. Allowed: {row.because}.{remark}", []).append(row.name)
     for text, members in about.items():
         shown.print(f"{', '.join(members)}: {text}", markup=False, highlight=False)
+    if any(row.fitted for row in rows):
+        shown.print("*: this value set a number of the model, which only gives it back", highlight=False)
     shown.print(f"{TITLE}: {summary(rows)}", markup=False, highlight=False, soft_wrap=True)
 
 

@@ -99,7 +99,7 @@ def test_stiffness_of_the_large_sizes_as_the_maker_prints_it():
 
 
 def test_angles_of_the_catalogue_follow_from_its_stiffness():
-    # CSF/CSG catalogue p. 50, Table 42, ratio 50: angle at T1 in 1e-4 rad, sizes 14 to 65. Two digits of each.
+    # CSF/CSG catalogue p. 50, Table 42, ratio 50: angle at T1 in 1e-4 rad, sizes 14 to 65, two digits.
     angles = [5.8, 4.9, 5.2, 5.5, 5.5, 5.2, 5.2, 5.5, 5.2, 5.2]
     for size, angle in zip((14, 17, 20, 25, 32, 40, 45, 50, 58, 65), angles, strict=True):
         gear = printed_gear(size, 50)
@@ -107,11 +107,10 @@ def test_angles_of_the_catalogue_follow_from_its_stiffness():
 
 
 def test_similar_gears_stiffness_grows_as_the_cube_of_the_size():
+    sizes = (20, 25, 32, 40, 45, 50, 58, 65)
     for ratio in (50, 100):
         for name in ("stiffness_k1", "stiffness_k2", "stiffness_k3"):
-            scaled = [
-                printed_gear(size, ratio)[name].value / size**3 for size in (20, 25, 32, 40, 45, 50, 58, 65)
-            ]
+            scaled = [printed_gear(size, ratio)[name].value / size**3 for size in sizes]
             assert max(scaled) < 1.35 * min(scaled)
 
 
