@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hdsim.log.mapping import Mapping
 
 #: Where the records lie in the folder of the data.
-LARA8 = "lara8-joint3-dual-encoder"
+LARA8 = "lara8-joint3-dual-encoder/joint3.csv"
 KINOVA = "kinova-gen3-7dof/validation_data/opti_traj_testing1.csv"
 CYCLOIDAL = "cycloidal-backlash-hysteresis"
 EROB = "erob80-friction-parameters/erob80_100/m1.json"
@@ -48,19 +48,20 @@ def _value(found: Estimation, name: str) -> tuple[float, float, float]:
     return (one.value, one.low, one.high) if one.determined else (one.value, math.nan, math.nan)
 
 
+#: Of LARA8's joint 3: speed of the record at the output in rad/s, ratio, and where its arm hangs, degrees.
 _SPEED = 0.87
 _RATIO = 101.0
-_HANGING = math.radians(-158.0)
+_HANGING_DEG = -158.0
 
 
 @cache
-def _lara8(folder: Path) -> tuple[Estimation, Record]:
+def _lara8(path: Path) -> tuple[Estimation, Record]:
     """A fit of friction, weight and wind-up from the catalogue's CSG-25-100, and the record."""
     from hdsim.drive.presets import preset
     from hdsim.estimate import estimate
     from hdsim.estimate.records import Record
 
-    data = np.genfromtxt(folder / "joint3.csv", delimiter=",", names=True)
+    data = np.genfromtxt(path, delimiter=",", names=True)
     step = 2.0 * math.pi / 2**24
     record = Record(
         "joint 3",
@@ -74,7 +75,7 @@ def _lara8(folder: Path) -> tuple[Estimation, Record]:
     gear = preset("csg-25-100")
     friction = gear["friction"] | {"load_coefficient": 0.0}  # the author's law knows no load
     drive = gear | {"arrangement": "flexspline_fixed", "mesh": {"model": "lumped"}, "friction": friction}
-    arm = {"mass_kg": 10.0, "centre_of_mass_m": 0.6, "hanging_angle_deg": math.degrees(_HANGING)}
+    arm = {"mass_kg": 10.0, "centre_of_mass_m": 0.6, "hanging_angle_deg": _HANGING_DEG}
     scenario = _scenario(drive, load={"inertia_kg_m2": 1.5, "gravity": arm})
     return estimate([record], scenario), record
 
@@ -83,11 +84,11 @@ def _lara8(folder: Path) -> tuple[Estimation, Record]:
 def lara8(data: Path | None) -> Iterator[Row]:
     """Friction and weight of a robot's joint with both encoders."""
     source = "A. Lucious, MasterThesis, friction_parameters_lara8.json (law of joint 3)"
-    folder = _there(data, LARA8)
+    path = _there(data, LARA8)
     friction = weight = regressed = math.nan
     law = 6.52696 + 1.14945 * (12.0 * _SPEED + math.tanh(54.5 * _SPEED))
-    if folder is not None:
-        found, record = _lara8(folder)
+    if path is not None:
+        found, record = _lara8(path)
         fitted = found.fit.state.drive.friction
         at_motor = fitted.coulomb_nm + fitted.viscous_nm_s_per_rad * _RATIO * _SPEED
         at_motor *= found.fit.state.gain
@@ -128,18 +129,19 @@ def erob80(data: Path | None) -> Iterator[Row]:
         stated = json.loads(path.read_text(encoding="utf-8"))
     friction = preset("csg-20-100")["friction"]
     for what, unit, law, ours in (
-        ("coulomb", "N m", "friction_base", 100.0 * friction["coulomb_nm"]),
+        ("Coulomb", "N m", "friction_base", 100.0 * friction["coulomb_nm"]),
         ("viscous", "N m s/rad", "friction_viscous", 100.0**2 * friction["viscous_nm_s_per_rad"]),
     ):
         yield Row(
-            f"erob80-{what}", f"eRob80 ratio 100: {what} friction, against CSG-20-100 at 20 °C", unit, source,
+            f"erob80-{what.lower()}", f"eRob80 ratio 100: {what} friction, against CSG-20-100 at 20 °C",
+            unit, source,
             stated[law], ours, 0.20, "two makers' products of one kind (estimate)",
             remark="the module's law holds motor, seals and its own grease besides the gear, whose size is "
             "not stated",
         )  # fmt: skip
 
 
-#: Torque over current, N m/A at the output, of the joints that turn both ways.
+#: Torque over current, N m/A at the output, of the joints that turn both ways, joint 6 hardly.
 _CONSTANT = {1: 9.130, 3: 9.130, 4: 9.130, 6: 5.852}
 _JOINTS = tuple(_CONSTANT)
 
@@ -154,8 +156,7 @@ def kinova(data: Path | None) -> Iterator[Row]:
         yield Row(
             f"kinova-{joint}-friction", f"Kinova Gen3 joint {joint}: friction{at}", "N m",
             "NumPy: motor torque less sensor torque over speed, its sign and acceleration",
-            stated, ours, 0.15,
-            "what is masked, smoothed and left free differs (estimate)",
+            stated, ours, 0.15, "masks, smoothing and what is left free differ (estimate)",
         )  # fmt: skip
 
 
@@ -231,12 +232,12 @@ def cycloidal(data: Path | None) -> Iterator[Row]:
     for k, (variant, (name, lost_deg)) in enumerate(_PLAYS.items(), 1):
         path = _there(data, f"{CYCLOIDAL}/{name}")
         play, low, high = _play(path) if path is not None else (math.nan, math.nan, math.nan)
-        interval = "" if math.isnan(low) else f"; interval of the fit {low:.0f} to {high:.0f} arcmin"
+        interval = "" if math.isnan(low) else f"interval of the fit {low:.0f} to {high:.0f} arcmin"
         yield Row(
             f"cycloidal-play-{k}", f"cycloidal actuator, {variant}: play", "arcmin",
             "lost motion at zero torque, read off the loops of JelmerV/Anti-Backlash-Cycloidal-Actuator",
             60.0 * lost_deg, play, 0.15, "lost motion holds friction besides the play (estimate)",
-            remark=interval[2:],
+            remark=interval,
         )  # fmt: skip
 
 
