@@ -64,14 +64,21 @@ def average_input_speed(recording: Recording, scenario: Scenario) -> float:
 )
 def bearing_life(recording: Recording, scenario: Scenario) -> float:
     """Hours of such work that nine of ten bearings survive."""
-    return bearing_life_h(gear_of(scenario), *_averages(recording))
+    life = bearing_life_h(gear_of(scenario), *_averages(recording))
+    if math.isinf(life):
+        raise InputError(
+            "the bearing's life needs a run in which the motor turns under load; here it does not"
+        )
+    return life
 
 
 def _distance(recording: Recording, scenario: Scenario, name: str, figure: Figure | None) -> float:
     if figure is None:
         raise InputError(f"no source gives the {name} of {scenario.drive.preset}")
     largest = float(np.max(np.abs(recording["output_torque"])))
-    return math.inf if largest == 0.0 else figure.value / largest
+    if largest == 0.0:
+        raise InputError(f"the distance to the {name} needs a run with an output torque; this one has none")
+    return figure.value / largest
 
 
 def _safety_metric(name: str, field: str, source: str) -> None:
