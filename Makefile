@@ -15,7 +15,7 @@ help:
 	@echo "make test-fast  the same without the slow studies"
 	@echo "make setup      only install what is needed into $(VENV)"
 	@echo "make lock       resolve the development set anew (needs uv)"
-	@echo "make schema     write scenarios/scenario.schema.json anew"
+	@echo "make schema     write the JSON schemas of scenarios and load cycles anew"
 	@echo "make blind      hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
 	@echo "make picture    draw docs/images/seed_move.png and diagnose_report.webp anew (the latter needs Chromium)"
 	@echo "make clean      remove $(VENV), caches and logs"
@@ -50,6 +50,7 @@ lock:
 
 schema: $(STAMP)
 	$(BIN)/hdsim schema -o scenarios/scenario.schema.json
+	$(BIN)/hdsim schema loadcycle -o scenarios/loadcycles/loadcycle.schema.json
 
 blind: $(STAMP)
 	$(BIN)/python tests/blind run --families numpy,mujoco,toothed,real --numbers 0-99 --seed 1 --jobs $(WORKERS) \

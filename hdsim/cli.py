@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "presets": ("hdsim.study.commands:presets", "List the drives that are ready to use."),
     "catalogue": ("hdsim.study.commands:catalogue", "Simulate a preset's catalogue lines; print the errors."),
     "bench": ("hdsim.study.commands:bench", "Measure a drive as a test bench does, beside its catalogue."),
+    "select": ("hdsim.study.commands_select:select", "Find the size that carries a load cycle."),
     "study": ("hdsim.study.commands_engine:study", "Run a study: parameters, replicates, metrics."),
     "budget": ("hdsim.study.commands_engine:budget", "Split a positioning error into its causes."),
     "tolerance": (
@@ -30,6 +31,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "Linearise a drive; its modes and Bode plot.",
     ),
     "reproduce": ("hdsim.reproduce.commands:reproduce", "Recompute every number of the source paper."),
+    "validate": (
+        "hdsim.validate.commands:validate",
+        "Hold hdsim against printed, measured and independent values.",
+    ),
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),

@@ -18,10 +18,10 @@ from hdsim.drive.catalogue import (
     SEED,
     SIZES_AND_RATIOS,
     CatalogueFigures,
-    Figure,
     csg_figures,
     friction_figures,
 )
+from hdsim.drive.printed import Figure
 from hdsim.errors import PhysicsError
 
 _SEED_NAME = "seed-2021"

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from hdsim.console import console
 from hdsim.scenario.problems import Problem, ScenarioError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 
 @click.command(short_help="Check scenarios and say what they describe.")
@@ -32,11 +36,12 @@ def check(files: tuple[str, ...]) -> None:
 
 
 @click.command(short_help="Print the JSON schema of scenarios, for editors.")
+@click.argument("of", type=click.Choice(["scenario", "loadcycle"]), default="scenario")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write it to this file.")
-def schema(output: Path | None) -> None:
-    """Print the JSON schema (draft 2020-12) of scenarios.
+def schema(of: str, output: Path | None) -> None:
+    """Print the JSON schema (draft 2020-12) of scenarios, or of the load cycles of ``hdsim select``.
 
-    An editor with the YAML language server completes and checks a scenario that begins with the line
+    An editor with the YAML language server completes and checks a file that begins with the line
 
     # yaml-language-server: $schema=hdsim.schema.json
     """
@@ -46,7 +51,12 @@ def schema(output: Path | None) -> None:
     from hdsim.scenario.model import Scenario
     from hdsim.scenario.schema import json_schema
 
-    text = json.dumps(json_schema(Scenario), indent=1)
+    described: type[BaseModel] = Scenario
+    if of == "loadcycle":
+        from hdsim.study.selection import LoadCycle
+
+        described = LoadCycle
+    text = json.dumps(json_schema(described), indent=1)
     if output is None:
         click.echo(text)
         return
@@ -54,7 +64,7 @@ def schema(output: Path | None) -> None:
         output.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"{output}: cannot be written ({error.strerror})") from error
-    click.echo(f"wrote {output}; begin a scenario with\n# yaml-language-server: $schema={output.as_posix()}")
+    click.echo(f"wrote {output}; begin a {of} with\n# yaml-language-server: $schema={output.as_posix()}")
 
 
 @click.command(short_help="List the physical effects that a scenario can turn on.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.recording import Event
+from hdsim.simulation.limits import Bearing, gear_of, speed_watches, torque_watches
+from hdsim.simulation.watches import Flanks, Watch
 
 if TYPE_CHECKING:
     from hdsim.drive.model import Model
@@ -26,84 +27,6 @@ UNLOADED = 1e-3
 FEW_STEPS = 100
 #: Share of the exchanged energy that the audit's residual may reach before it is a doubt.
 DOUBT = 1e-3
-
-
-@dataclass
-class Watch:
-    """A condition on one channel, with a margin between its beginning and its end.
-
-    Args:
-        source: who tells.
-        level: of the event at its beginning.
-        begins: what is told when ``value`` rises above ``on``; ``{value}`` is the number.
-        ends: what is told when it falls below ``off`` again; nothing when empty.
-        on: threshold of the beginning.
-        off: threshold of the end, at most ``on``.
-    """
-
-    source: str
-    level: str
-    begins: str
-    ends: str
-    on: float
-    off: float
-    _holds: bool = False
-    _last: tuple[float, float] | None = None
-
-    def feed(self, time: Array, value: Array) -> Iterator[Event]:
-        """Events in the next samples: time (n,) in s, value (n,)."""
-        if self._last is None:
-            self._last = (float(time[0]), -np.inf)
-        times = np.concatenate([[self._last[0]], time])
-        values = np.concatenate([[self._last[1]], value])
-        at = 1
-        while at < len(values):
-            threshold = self.off if self._holds else self.on
-            over = values[at:] >= threshold
-            changed = np.flatnonzero(over != self._holds)
-            if not len(changed):
-                break
-            at += int(changed[0])
-            self._holds = not self._holds
-            text = self.begins if self._holds else self.ends
-            if text:
-                moment = _crossing(times[at - 1 : at + 1], values[at - 1 : at + 1], threshold)
-                level = self.level if self._holds else "info"
-                yield Event(moment, level, self.source, text.format(value=values[at]))
-            at += 1
-        self._last = (float(times[-1]), float(values[-1]))
-
-
-@dataclass
-class Flanks:
-    """Torque that changes its sign: the teeth go from one flank through the gap to the other.
-
-    Args:
-        unloaded: torque below which no flank is loaded, N m.
-    """
-
-    unloaded: float
-    _side: float = 0.0
-    _left: float = 0.0
-
-    def feed(self, time: Array, torque: Array) -> Iterator[Event]:
-        """Events in the next samples: time (n,) in s, torque (n,) in N m."""
-        side = np.where(torque > self.unloaded, 1.0, np.where(torque < -self.unloaded, -1.0, 0.0))
-        loaded = np.flatnonzero(side)
-        for k in loaded[np.diff(side[loaded], prepend=self._side) != 0]:
-            if self._side:
-                before = loaded[loaded < k]
-                left = float(time[before[-1]]) if len(before) else self._left
-                way = (
-                    "from the positive to the negative"
-                    if side[k] < 0
-                    else "from the negative to the positive"
-                )
-                took = 1e3 * (float(time[k]) - left)
-                yield Event(left, "info", "mesh", f"gap crossed {way} flank in {took:.3g} ms")
-            self._side = float(side[k])
-        if len(loaded):
-            self._left = float(time[loaded[-1]])
 
 
 @dataclass
@@ -148,17 +71,10 @@ class EventDetector:
                 rated * margin,
             )
         ]
-        for name, limit in catalogue_limits(self.model).items():
-            self._output.append(
-                Watch(
-                    "drive",
-                    "error",
-                    f"{name} of {limit:.4g} N m exceeded",
-                    f"torque below the {name.split(',')[0]} again",
-                    limit,
-                    limit * margin,
-                )
-            )
+        gear = gear_of(self.model)
+        self._output += [] if gear is None else torque_watches(gear, margin)
+        self._input = [] if gear is None else speed_watches(gear, margin)
+        self._bearing = None if gear is None or gear.rated_torque is None else Bearing(gear)
         self._flanks = Flanks(UNLOADED * rated)
         limit = torque_limit(self.model)
         self._limited_torque = bool(np.isfinite(limit))
@@ -225,6 +141,12 @@ class EventDetector:
         torque = state["output_torque"]
         for watch in self._output:
             found += watch.feed(time, np.abs(torque))
+        if "motor_velocity" in state:
+            speed = state["motor_velocity"]
+            for watch in self._input:
+                found += watch.feed(time, np.abs(speed))
+            if self._bearing is not None:
+                self._bearing.feed(time, torque, speed)
         found += self._flanks.feed(time, torque)
         if self._limited_torque:
             found += self._saturation.feed(time, np.abs(state["motor_torque"]))
@@ -266,6 +188,8 @@ class EventDetector:
             for (source, kind), count in self._counts.items()
             if count.untold
         ]
+        if self._bearing is not None:
+            found += self._bearing.told(time)
         if failure is None:
             found.append(Event(time, "info", "run", "run ends"))
         return found
@@ -312,24 +236,6 @@ class EventDetector:
         return told
 
 
-def catalogue_limits(model: Model) -> dict[str, float]:
-    """Torques that a catalogue drive survives once, or not (the teeth skip), N m; none for other drives."""
-    from hdsim.drive.presets import catalogue_figures
-    from hdsim.errors import HdsimError
-
-    if model.drive.preset is None:
-        return {}
-    try:
-        figures = catalogue_figures(model.drive.preset)
-    except (HdsimError, KeyError, ValueError):
-        return {}
-    found = {
-        "momentary peak torque": figures.momentary_peak_torque,
-        "ratcheting torque, at which teeth skip in a real drive and never here,": figures.ratcheting_torque,
-    }
-    return {name: figure.value for name, figure in found.items() if figure is not None}
-
-
 def torque_limit(model: Model) -> float:
     """Torque limit of the motor's controller, N m; infinite for none."""
     for part in model.parts:
@@ -337,12 +243,3 @@ def torque_limit(model: Model) -> float:
         if limit is not None:
             return float(limit)
     return float(np.inf)
-
-
-def _crossing(times: Array, values: Array, threshold: float) -> float:
-    """When a straight line between two samples meets the threshold; the later one where it has no slope."""
-    low, high = values
-    if not np.isfinite(low) or low == high:
-        return float(times[1])
-    share = min(max((threshold - low) / (high - low), 0.0), 1.0)
-    return float(times[0] + share * (times[1] - times[0]))

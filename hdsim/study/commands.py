@@ -70,21 +70,33 @@ def bench(
 @click.command()
 @click.argument("name", required=False)
 def presets(name: str | None) -> None:
-    """List the drives that are ready to use, or what is printed about the one called NAME."""
+    """List the drives that are ready to use, or what is printed about the gear called NAME.
+
+    NAME is a preset, or a gear of which ratings alone are on record (csg-32-100, shg-20-100, csf-40-120).
+    """
     from rich.table import Table
 
     from hdsim.console import console
-    from hdsim.drive.catalogue import Figure
     from hdsim.drive.presets import catalogue_figures, preset_names
+    from hdsim.drive.printed import Figure
+    from hdsim.drive.printed_gear import printed_gear
+    from hdsim.drive.ratings import ratings_of_preset
     from hdsim.errors import InputError
 
     if name is not None:
+        limits = ratings_of_preset(name)
         try:
-            figures = catalogue_figures(name)
+            figures = None if limits and name not in preset_names() else catalogue_figures(name)
         except ValueError as error:
             raise InputError(str(error)) from None
-        table = Table("quantity (SI units)", "value", "seen", "source", title=f"Printed about {name}")
-        for field, value in vars(figures).items():
+        table = Table(
+            "quantity", "value", "seen", "source", title=f"Printed about {name}, SI units but rpm and h"
+        )
+        gear = printed_gear(limits.size, limits.ratio) if limits else {}
+        if limits and limits.series == "shg":
+            del gear["wave_generator_inertia"]  # the hat type's, with its hollow shaft, is another one
+        printed = (vars(limits) if limits else {}) | gear | (vars(figures) if figures else {})
+        for field, value in printed.items():
             if isinstance(value, Figure):
                 table.add_row(
                     field.replace("_", " "),
@@ -92,7 +104,7 @@ def presets(name: str | None) -> None:
                     value.source.confidence,
                     value.source.citation,
                 )
-        for rpm, value in figures.running_torque:
+        for rpm, value in figures.running_torque if figures else ():
             table.add_row(
                 f"running torque, {rpm:g} rpm",
                 f"{value.value:.4g}",

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from test_jacobian import check
 
 from hdsim.drive.friction import contact_damping
@@ -14,13 +13,26 @@ from hdsim.kernel import DISSIPATED, OWN, TRANSMITTED_TORQUE, TWIST_RATE, TWIST_
 from hdsim.recording import Recording
 from hdsim.scenario import Scenario
 from hdsim.simulation.setup import build_model, build_run
+from hdsim.validate.play import (
+    ARCSEC,
+    COULOMB,
+    DAMPING,
+    HALF_PLAY,
+    LOAD,
+    MOTOR,
+    POSITION_GAIN,
+    RATIO,
+    REFERENCE,
+    RING,
+    SMOOTHING,
+    STIFFNESS,
+    VELOCITY_GAIN,
+    VISCOUS,
+    cycle,
+    with_scipy,
+)
 
-ARCSEC = np.pi / 180 / 3600
-STIFFNESS, DAMPING, PLAY_ARCMIN = 2.0e4, 85.0, 6.0
-COULOMB, VISCOUS, SMOOTHING = 0.005, 1e-4, 0.5
-MOTOR, LOAD, RING = 0.7e-4, 0.5, 2e-5
-POSITION_GAIN, VELOCITY_GAIN, REFERENCE = 80.0, 0.01, np.radians(0.5)
-RATIO = -100.0
+PLAY_ARCMIN = 2 * HALF_PLAY / ARCSEC / 60
 
 
 def loop(mesh: dict[str, Any], play_arcmin: float, duration_s: float, **drive: Any) -> Recording:
@@ -60,15 +72,6 @@ def loop(mesh: dict[str, Any], play_arcmin: float, duration_s: float, **drive: A
     ).record()
 
 
-def cycle(time: np.ndarray, angle: np.ndarray) -> tuple[float, float]:
-    """Amplitude (arcsec) and frequency (Hz) of the last 40 % of a record."""
-    late = time > 0.6 * time[-1]
-    t, x = time[late], angle[late] - np.mean(angle[late])
-    up = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
-    crossings = t[up] - x[up] * (t[up + 1] - t[up]) / (x[up + 1] - x[up])
-    return 0.5 * float(np.ptp(x)) / ARCSEC, 1.0 / float(np.mean(np.diff(crossings)))
-
-
 LINEAR = {
     "torsion": {
         "stiffness_k1_nm_per_rad": STIFFNESS,
@@ -80,38 +83,9 @@ LINEAR = {
 }
 
 
-def elasto_backlash(twist: float, rate: float) -> float:
-    """Modelica.Mechanics.Rotational.Components.ElastoBacklash: no pull, damping up to the spring's torque."""
-    half = 0.5 * PLAY_ARCMIN * 60 * ARCSEC
-    if abs(twist) <= half:
-        return 0.0
-    spring = STIFFNESS * (twist - np.copysign(half, twist))
-    damper = DAMPING * rate
-    if spring > 0:
-        return 0.0 if spring + damper <= 0 else spring + min(spring, damper)
-    return 0.0 if spring + damper >= 0 else spring + max(spring, damper)
-
-
-def own_loop(duration_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same loop written down once more: two masses, Modelica's contact, SciPy."""
-
-    def rates(_: float, y: np.ndarray) -> list[float]:
-        motor, speed, output, output_speed = y
-        torque = elasto_backlash(motor / RATIO - output, speed / RATIO - output_speed)
-        drive = VELOCITY_GAIN * (RATIO * POSITION_GAIN * (REFERENCE - output) - speed)
-        friction = COULOMB * np.tanh(speed / SMOOTHING) + VISCOUS * speed
-        return [speed, (drive - friction - torque / RATIO) / MOTOR, output_speed, torque / (LOAD + RING)]
-
-    times = np.arange(round(4000 * duration_s) + 1) / 4000
-    found = solve_ivp(
-        rates, (0, duration_s), np.zeros(4), "LSODA", times, rtol=1e-9, atol=1e-11, max_step=5e-4
-    )
-    return found.t, found.y[2]
-
-
 def test_the_loop_over_a_drive_with_play_moves_as_an_own_ode_of_modelicas_contact() -> None:
     found = loop({"model": "lumped"}, PLAY_ARCMIN, 1.5, **LINEAR)
-    time, expected = own_loop(1.5)
+    time, expected = with_scipy()  # two masses and Modelica's contact, written down once more
     early = time < 0.4
     np.testing.assert_allclose(
         found["output_angle"][early], expected[early], atol=2e-3 * np.ptp(expected[early])

@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hdsim.drive.catalogue import ARCMIN, SIZES_AND_RATIOS, Figure
+from hdsim.drive.catalogue import SIZES_AND_RATIOS
 from hdsim.drive.presets import catalogue_figures, friction_from_catalogue, preset, preset_names
+from hdsim.drive.printed import ARCMIN, Figure
+from hdsim.drive.printed_gear import printed_gear
 from hdsim.errors import PhysicsError
 
 SIZES = (14, 17, 20, 25)
@@ -112,6 +114,38 @@ def test_stiffness_table_of_the_maker():
         column = 2 * SIZES.index(size) + (ratio > 50)
         for field, row in rows.items():
             assert getattr(figures, field).value == pytest.approx(1e3 * float(row.split()[column]))
+
+
+def test_stiffness_of_the_large_sizes_as_the_maker_prints_it():
+    # CHA p. 54: K3, K2, K1 in 1e3 N m/rad; sizes 32, 40, 50, 58 times ratio 50, > 50
+    rows = {
+        "stiffness_k3": "98 120 180 230 340 440 540 710",
+        "stiffness_k2": "78 110 140 200 280 400 440 610",
+        "stiffness_k1": "54 67 100 130 200 250 310 400",
+    }
+    limits = {32: (29, 108), 40: (54, 196), 50: (108, 382), 58: (168, 598)}
+    for column, size in enumerate(limits):
+        for above in (False, True):
+            gear = printed_gear(size, 100 if above else 50)
+            assert (gear["torque_t1"].value, gear["torque_t2"].value) == limits[size]
+            for field, row in rows.items():
+                assert gear[field].value == pytest.approx(1e3 * float(row.split()[2 * column + above]))
+
+
+def test_angles_of_the_catalogue_follow_from_its_stiffness():
+    # CSF/CSG catalogue p. 50, Table 42, ratio 50: angle at T1 in 1e-4 rad, sizes 14 to 65, two digits.
+    angles = [5.8, 4.9, 5.2, 5.5, 5.5, 5.2, 5.2, 5.5, 5.2, 5.2]
+    for size, angle in zip((14, 17, 20, 25, 32, 40, 45, 50, 58, 65), angles, strict=True):
+        gear = printed_gear(size, 50)
+        assert 1e4 * gear["torque_t1"].value / gear["stiffness_k1"].value == pytest.approx(angle, rel=0.06)
+
+
+def test_similar_gears_stiffness_grows_as_the_cube_of_the_size():
+    sizes = (20, 25, 32, 40, 45, 50, 58, 65)
+    for ratio in (50, 100):
+        for name in ("stiffness_k1", "stiffness_k2", "stiffness_k3"):
+            scaled = [printed_gear(size, ratio)[name].value / size**3 for size in sizes]
+            assert max(scaled) < 1.35 * min(scaled)
 
 
 def test_accuracy_table_of_the_maker():

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from hdsim.drive.parameters import Drive
 from hdsim.drive.presets import preset_names
@@ -14,6 +13,7 @@ from hdsim.recording import Recording
 from hdsim.scenario import Scenario
 from hdsim.simulation.run import Run
 from hdsim.simulation.setup import build_run
+from hdsim.validate.stiction import exact_stiction
 
 ARCSEC = np.pi / 180 / 3600
 
@@ -105,53 +105,13 @@ def test_stick_and_slip_at_default_tolerance_are_those_of_radau_at_1e_9(
     assert error < 5e-5
 
 
-def exact(
-    torque: Any, duration: float, coulomb: float, viscous: float, inertia: float
-) -> tuple[np.ndarray, float]:
-    """Exact stiction of one inertia from rest, by events: angle at 1 kHz, share of the time stuck."""
-    times = np.arange(round(1000 * duration) + 1) / 1000
-    found, t, angle, stuck = np.zeros(len(times)), 0.0, 0.0, 0.0
-    while t < duration:
-        # Stuck until the torque is above the Coulomb friction.
-        fine = np.linspace(t, duration, 200_001)
-        above = np.flatnonzero(np.abs(torque(fine)) > coulomb)
-        begin = duration if not len(above) else float(fine[above[0]])
-        found[times >= t] = angle
-        stuck += begin - t
-        if begin >= duration:
-            break
-        sign = np.sign(torque(begin))
-
-        def rates(t: float, y: np.ndarray, sign: float = sign) -> list[float]:
-            return [y[1], (torque(t) - sign * coulomb - viscous * y[1]) / inertia]
-
-        def stops(t: float, y: np.ndarray, sign: float = sign, begin: float = begin) -> float:
-            return sign * y[1] + (1e-9 if t < begin + 1e-3 else 0.0)
-
-        stops.terminal, stops.direction = True, -1  # type: ignore[attr-defined]
-        slip = solve_ivp(
-            rates,
-            (begin, duration),
-            [angle, 0.0],
-            events=stops,
-            dense_output=True,
-            rtol=1e-10,
-            atol=1e-13,
-            max_step=1e-3,
-        )
-        t, angle = float(slip.t[-1]), float(slip.y[0, -1])
-        inside = (times >= begin) & (times <= t)
-        found[inside] = slip.sol(times[inside])[0]
-    return found, stuck / duration
-
-
 def test_stick_and_slip_are_those_of_exact_stiction() -> None:
     # A rigid drive is one inertia, with friction on its motor alone.
     friction = {"coulomb_nm": 0.03, "viscous_nm_s_per_rad": 1e-3, "load_coefficient": 0.0}
     motor = {"type": "torque", "torque": {"type": "sine", "amplitude_nm": 0.045, "frequency_hz": 2.0}}
     run, found = run_of(motor, {}, 1.5, "rigid", friction=friction)
     inertia = run.model.inertias[0] + run.model.inertias[2] / 1e4
-    wanted, stuck = exact(lambda t: 0.045 * np.sin(4 * np.pi * t), 1.5, 0.03, 1e-3, inertia)
+    _, wanted, stuck = exact_stiction(lambda t: 0.045 * np.sin(4 * np.pi * t), 1.5, 0.03, 1e-3, inertia)
     assert stuck > 0.25
     np.testing.assert_allclose(found["motor_angle"], wanted, atol=1e-4 * np.ptp(wanted))
 

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 import hdsim
+from hdsim.drive.ratings import ratings
 from hdsim.recording import Column, Table
 from hdsim.scenario.model import Scenario
-from hdsim.simulation.events import MOST, EventDetector, Flanks, Watch
+from hdsim.simulation.events import MOST, EventDetector
+from hdsim.simulation.limits import Bearing
 from hdsim.simulation.setup import build_model, build_run
 from hdsim.simulation.solvers import Statistics
+from hdsim.simulation.watches import Flanks, Watch
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -72,6 +75,53 @@ def test_a_torque_at_which_teeth_skip_is_told():
     assert told
     assert told[0].level == "error"
     assert "330 N m exceeded" in told[0].message
+
+
+def test_a_torque_at_which_the_flexspline_folds_is_told_once_each_way_by_its_whole_name():
+    run = build_run(scenario(torque={"type": "triangle", "amplitude_nm": 2000, "frequency_hz": 1}))
+    told = [e.message for e in run.record().events if e.source == "drive" and "buckling" in e.message]
+    why = "at which the flexspline of a real drive folds and never here"
+    assert told[0] == f"buckling torque, {why}, of 800 N m exceeded"
+    assert told[1] == "torque below the buckling torque again"
+    # The triangle passes the limit upwards once on either side of zero.
+    assert len(told) == 4
+
+
+def at_one_speed(rpm: float, torque_nm: float, preset: str = "csg-20-100") -> Scenario:
+    return Scenario.model_validate(
+        {
+            "drive": {"preset": preset, "mesh": {"model": "lumped"}},
+            "command": {"motor": {"type": "motion", "trajectory": {"type": "ramp", "velocity_rpm": -rpm}}},
+            "load": {"inertia_kg_m2": 0.05, "torque": {"type": "hold", "torque_nm": -torque_nm}},
+            "run": {"duration_s": 2.0},
+        }
+    )
+
+
+def test_an_input_speed_beyond_the_gears_is_told():
+    events = build_run(at_one_speed(7000, 0.0)).record().events
+    assert any(e.message == "maximum input speed of 6500 rpm exceeded" for e in events)
+    assert not any("input speed" in e.message for e in build_run(at_one_speed(6400, 0.0)).record().events)
+
+
+def test_a_bearing_that_lives_shorter_than_rated_is_told_with_the_cubic_law():
+    # Twice the rated 52 N m at the rated speed: an eighth of 10,000 h.
+    (told,) = [e for e in build_run(at_one_speed(2000, 104.0)).record().events if "bearing life" in e.message]
+    assert float(told.message.split()[3]) == pytest.approx(1250, rel=0.02)
+    assert told.level == "warning"
+    calm = build_run(at_one_speed(2000, 50.0)).record().events
+    assert not [e for e in calm if "bearing life" in e.message]
+
+
+def test_the_life_of_a_bearing_does_not_depend_on_how_the_samples_are_cut():
+    rng = np.random.default_rng(1)
+    time, torque, speed = np.arange(1000) * 1e-3, 60 * rng.normal(size=1000), 200 * rng.normal(size=1000)
+    gear = ratings("csg-20-100")
+    whole, pieces = Bearing(gear), Bearing(gear)
+    whole.feed(time, torque, speed)
+    for k in range(0, 1000, 7):
+        pieces.feed(time[k : k + 7], torque[k : k + 7], speed[k : k + 7])
+    assert pieces.life_h == pytest.approx(whole.life_h, rel=1e-9)
 
 
 def test_moves_and_rests_of_the_command_are_told():
