@@ -64,6 +64,7 @@ UNITS = {
     "saturation_torque_nm": "N m",
     "saturation_twist_mrad": "mrad",
     "slip_torque_nm": "N m",
+    "slip_twist_scale": "",
     "static_nm": "N m",
     "stiffness_nm_per_rad": "N m/rad",
     "stribeck_velocity_rad_per_s": "rad/s",
