@@ -15,7 +15,7 @@ import numpy as np
 from contract import Case, Kind
 from drawing import log_uniform
 from drives import DRIVES, GRAVITY, LEVER, around, base_yaml
-from hidden import ANY, EFFECTS, KINDS_OF, Changes, Expected, Hidden
+from hidden import ANY, EARLIER, EFFECTS, KINDS_OF, LATER, Changes, Expected, Hidden
 from outside import OUTSIDE
 from sensing import SENSORS, Setup, measure, numbers
 from strength import Strength, plain_strength, strength, unresolved
@@ -119,7 +119,8 @@ def wanted_of(number: int, seed: int, rng: np.random.Generator) -> Wanted:
     hidden: tuple[Hidden, ...] = ()
     strengths: tuple[float, ...] = ()
     if kind == "effect":
-        hidden = (EFFECTS[order.permutation(len(EFFECTS))[turn % len(EFFECTS)]],)
+        shuffled = [group[k] for group in (EARLIER, LATER) for k in order.permutation(len(group))]
+        hidden = (shuffled[turn % len(EFFECTS)],)
         strengths = (log_uniform(rng, *STRENGTH),)
     elif kind == "outside":
         hidden = (OUTSIDE[order.permutation(len(OUTSIDE))[turn % len(OUTSIDE)]],)
@@ -142,7 +143,7 @@ def wanted_of(number: int, seed: int, rng: np.random.Generator) -> Wanted:
 
 def _pair(rng: np.random.Generator) -> tuple[Hidden, ...]:
     while True:
-        one, other = (EFFECTS[k] for k in rng.choice(len(EFFECTS), 2, replace=False))
+        one, other = (EARLIER[k] for k in rng.choice(len(EARLIER), 2, replace=False))
         together = set(one.motions) & set(other.motions) & set(ANY)
         if together and not any({one.name, other.name} <= kind for kind in KINDS_OF):
             return one, other

@@ -52,7 +52,7 @@ class Hidden:
 HYSTERESIS = ("torsional_hysteresis_duhem", "torsional_hysteresis_maxwell")
 BY_TORQUE = ("swing", "moves", "chirp", "multisine", "locked")
 
-EFFECTS = (
+EARLIER = (
     Hidden(
         "kinematic_error",
         builders.kinematic,
@@ -266,12 +266,33 @@ EFFECTS = (
     ),
 )
 
+#: They have their turns after the others, and are in no pair: earlier keys draw what they have always drawn.
+LATER = (
+    Hidden(
+        "load_dependent_kinematic_error",
+        builders.uneven,
+        most=40,
+        limit="0.2 K1",
+        motions=("swing", "moves", "chirp", "multisine"),
+        arm=True,
+        expected=builders.uneven_expected,
+    ),
+    Hidden(
+        "position_dependent_friction",
+        builders.lumpy,
+        most=40,
+        limit="twice the Coulomb friction",
+        expected=builders.lumpy_expected,
+    ),
+)
+EFFECTS = (*EARLIER, *LATER)
+
 #: Effects of one kind can look alike; the two of a pair are of different kinds.
 KINDS_OF = (
     frozenset({"kinematic_error", "wave_generator_eccentricity", "damaged_tooth", "output_eccentricity",
-               "output encoder eccentricity", "output encoder delay"}),
+               "output encoder eccentricity", "output encoder delay", "load_dependent_kinematic_error"}),
     frozenset({"stribeck_friction", "lugre_friction", "load_side_friction", "input_coulomb_viscous",
-               "thermal_friction", "load_dependent_loss"}),
+               "thermal_friction", "load_dependent_loss", "position_dependent_friction"}),
     frozenset({"torsional_hysteresis_maxwell", "torsional_hysteresis_duhem", "output_backlash",
                "stiffness_nonlinearity", "flexspline_stiffening", "wave_generator_compliance",
                "base_flexibility"}),

@@ -43,6 +43,10 @@ class Numbers(NamedTuple):
     wg_once_skew: float = 0.0
     out_once: float = 0.0
     out_once_phase: float = 0.0
+    # stiffness that varies with the motor's angle, order 2
+    uneven: float = 0.0
+    uneven_phase: float = 0.0
+    uneven_form: float = 0.0
     # damaged tooth
     bump: float = 0.0
     bump_at: float = 0.0
@@ -67,6 +71,12 @@ class Numbers(NamedTuple):
     loss_power: float = 1.0
     loss_scale: float = 1.0
     loss_form: float = 0.0
+    # that varies with the motor's angle, orders 1 and 2
+    lumpy_1: float = 0.0
+    lumpy_1_phase: float = 0.0
+    lumpy_2: float = 0.0
+    lumpy_2_phase: float = 0.0
+    lumpy_form: float = 0.0
     thermal: float = 0.0
     heat_capacity: float = 8.0
     thermal_resistance: float = 1.5

@@ -20,9 +20,11 @@ from hdsim.effects._fitting import range_of, scales_of
 from hdsim.effects.base_flexibility import BaseFlexibility
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
+from hdsim.effects.load_dependent_kinematic_error import LoadDependentKinematicError, StiffnessComponent
 from hdsim.effects.load_dependent_loss import LoadDependentLoss
 from hdsim.effects.lugre_friction import LugreFriction
 from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
+from hdsim.effects.position_dependent_friction import FrictionComponent, PositionDependentFriction
 from hdsim.effects.thermal_friction import ThermalFriction
 from hdsim.effects.torsional_hysteresis_maxwell import SlipElement, TorsionalHysteresisMaxwell
 from hdsim.effects.unbalance import Unbalance
@@ -92,6 +94,22 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     ),
     "motor_torque_ripple, phases": (
         MotorTorqueRipple(components=(RippleComponent(order=7, cogging_nm=0.01, share=0.1, phase_deg=30),)),
+    ),
+    "load_dependent_kinematic_error, phases": (
+        LoadDependentKinematicError(
+            components=(
+                StiffnessComponent(order=2.5, stiffness_nm_per_rad=700, phase_deg=40, per="relative_turn"),
+                StiffnessComponent(order=3, stiffness_nm_per_rad=300, phase_deg=-70, per="output_turn"),
+            )
+        ),
+    ),
+    "position_dependent_friction, phases": (
+        PositionDependentFriction(
+            components=(
+                FrictionComponent(order=2.5, amplitude_nm=0.01, phase_deg=40, per="relative_turn"),
+                FrictionComponent(order=3, amplitude_nm=0.02, phase_deg=-70, per="output_turn"),
+            )
+        ),
     ),
     "base_flexibility, housing": (BaseFlexibility(stiffness_nm_per_rad=3e5, natural_frequency_hz=70),),
     "load_dependent_loss, by direction": (LoadDependentLoss(coefficient=0.2, back_driving_coefficient=0.05),),
