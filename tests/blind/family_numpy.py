@@ -181,6 +181,13 @@ def _sized(wanted: Wanted, rng: np.random.Generator, attempt: int) -> Sized | No
     return Sized(setups, held, changes, tuple(found), expected, max(misses))
 
 
+def measured_share(hidden: tuple[Hidden, ...]) -> float:
+    """Share of the records that hold the temperature."""
+    if any(h.temperature for h in hidden):
+        return 1.0
+    return 0.5 if any(h.name == "thermal_friction" for h in hidden) else 0.25
+
+
 def _setups(
     wanted: Wanted, rng: np.random.Generator, attempt: int
 ) -> tuple[tuple[Setup, ...], tuple[Setup, ...]]:
@@ -209,7 +216,7 @@ def _setups(
         seconds=max(5.0, seconds / count),
         seed=(int(rng.integers(2**31)), 0),
         sensors=sensors,
-        temperature=bool(rng.random() < (0.5 if any(h.name == "thermal_friction" for h in hidden) else 0.25)),
+        temperature=bool(rng.random() < measured_share(hidden)),
         noise=noise,
         torque_noise=torque_noise,
         step=log_uniform(rng, *STEP),

@@ -105,7 +105,10 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     housing = 1.0 - 1.0 / p.ratio
     twist = m / p.ratio + e - o + housing * b
     rate = wm * (1.0 / p.ratio + by_m) + wo * (by_o - 1.0) + housing * wb
-    tau = spring_torque(twist, table, reach, p) + p.damping * rate
+    # Else faster the warmer it is.
+    above = y[9] - 20.0
+    softer = p.warm * above * (1.0 if p.warm_form > 0 else 0.7 + 0.03 * above)
+    tau = spring_torque(twist, table, reach, p) * (1.0 - softer) + p.damping * rate
     uneven, by_angle = uneven_at(m, p)
     tau += uneven * twist
     if p.maxwell > 0:
@@ -153,6 +156,10 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
         else:
             # Narrower where it is tight than where it is easy.
             friction += (p.lumpy_1 * math.exp(once) + p.lumpy_2 * math.exp(twice)) * sign
+    if p.ball > 0:
+        # Ball diameter over pitch diameter; the outer ring turns with a flexspline that is the output.
+        met = math.sin((1.0 + p.ball_share) * (m - (o if p.ratio < 0 else 0.0)) + p.ball_phase)
+        friction += p.ball * (1.0 + met if p.ball_form > 0 else math.exp(met)) * sign
     friction += p.churn * wm * abs(wm)
     friction += p.zone * sign * math.exp(-(((o - p.zone_at) / p.zone_width) ** 2))
     if p.brake > 0:

@@ -65,3 +65,25 @@ def test_friction_over_the_angle_is_told_from_a_ripple_by_turning_round(tmp_path
     (found,) = diagnose([rigid_record(extra=lumpy, seed=2)], scenario(tmp_path)).verdict.effects
     assert found.name == name
     assert "position_dependent_friction" not in found.indistinguishable_from
+
+
+def test_a_stiffness_that_falls_with_the_measured_temperature_is_named(tmp_path):
+    base = scenario(tmp_path, "lumped")
+    load = varying_load()
+    warmer = 20.0 + 30.0 * np.linspace(0.0, 1.0, len(load))
+    softer = {"thermal_stiffness": {"stiffness_coefficient_per_k": 2e-3}}
+    record = hidden(base, softer, load_torque=load, temperature=warmer)
+    (found,) = diagnose([record], base).verdict.effects
+    assert found.name == "thermal_stiffness"
+    assert found.indistinguishable_from == []
+    assert found.parameters["stiffness_coefficient_per_k"].value == pytest.approx(2e-3, rel=0.05)
+
+
+def test_a_larger_ball_is_told_from_friction_of_the_wave_generators_own_orders(tmp_path):
+    def larger(angle, velocity):
+        return 0.006 * (1 + np.sin(1.088 * angle * 1.01 + 0.4)) * np.tanh(velocity / 0.5)
+
+    (found,) = diagnose([rigid_record(12.0, extra=larger, seed=2)], scenario(tmp_path)).verdict.effects
+    assert found.name == "wave_generator_bearing"
+    assert found.parameters["ball_to_pitch_diameter"].value == pytest.approx(0.088, abs=2e-3)
+    assert found.parameters["components.0.friction_nm"].value == pytest.approx(0.006, rel=0.05)

@@ -26,8 +26,10 @@ from hdsim.effects.lugre_friction import LugreFriction
 from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
 from hdsim.effects.position_dependent_friction import FrictionComponent, PositionDependentFriction
 from hdsim.effects.thermal_friction import ThermalFriction
+from hdsim.effects.thermal_stiffness import ThermalStiffness
 from hdsim.effects.torsional_hysteresis_maxwell import SlipElement, TorsionalHysteresisMaxwell
 from hdsim.effects.unbalance import Unbalance
+from hdsim.effects.wave_generator_bearing import BearingComponent, WaveGeneratorBearing
 from hdsim.parts import Effect
 
 COORDINATES = {
@@ -86,6 +88,15 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     "thermal_friction, Coulomb": (
         ThermalFriction(coulomb_nm=0.03, viscous_nm_s_per_rad=1e-3),
         InputCoulombViscous(coulomb_nm=0.03),  # the friction that it changes
+    ),
+    "thermal_stiffness, warming": (ThermalStiffness(), ThermalFriction()),
+    "wave_generator_bearing, cage": (
+        WaveGeneratorBearing(
+            components=(
+                BearingComponent(at="cage", harmonic=2, friction_nm=0.01, error_arcmin=0.2, phase_deg=40),
+                BearingComponent(at="ball_spin", friction_nm=0.02),
+            )
+        ),
     ),
     "maxwell, given elements": (
         TorsionalHysteresisMaxwell(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hdsim.effects.wave_generator_bearing import BearingComponent, WaveGeneratorBearing
 from hdsim.recording import Recording
 from hdsim.scenario import Scenario
 from hdsim.simulation.setup import build_run
@@ -83,3 +84,42 @@ def test_friction_over_the_angle_is_felt_at_the_motor_and_all_of_it_is_heat(spee
     turned_by = 2 * r["motor_angle"] + math.radians(30)
     work = abs(0.01 * (r["motor_angle"] - 0.5 * (np.cos(turned_by) - np.cos(turned_by[0]))))
     assert r["heat"][late] == pytest.approx(work[late], rel=1e-3)
+
+
+@pytest.mark.parametrize("mesh", ["lumped", "teeth"])
+@pytest.mark.parametrize("arrangement", ["circular_spline_fixed", "flexspline_fixed"])
+def test_a_warm_drive_winds_up_by_as_much_more_as_its_steel_is_softer(mesh: str, arrangement: str) -> None:
+    softer = {"stiffness_coefficient_per_k": 1e-3, "temperature_degc": 60.0}
+    drive = {"mesh": {"model": mesh}, "arrangement": arrangement}
+    winds = []
+    for effects in ({}, {"thermal_stiffness": softer}):
+        r = turned(effects, TORQUE, 0.0, **drive)
+        winds.append(r["output_angle"][-1])
+    # Of the whole wind-up: of teeth, contact and gap are no spring of steel, but hardly a hundredth.
+    assert winds[1] / winds[0] == pytest.approx(1 / (1 - 0.04), rel=1e-5 if mesh == "lumped" else 2e-3)
+
+
+def rolled(balls: int, ball: float, pitch: float, inner: float, outer: float) -> dict[str, float]:
+    """Angles of a bearing whose balls roll on both rings, from the speeds at the points of contact."""
+    inner_radius, outer_radius = 0.5 * (pitch - ball), 0.5 * (pitch + ball)
+    centre = 0.5 * (inner * inner_radius + outer * outer_radius)  # the ball's, half way between the contacts
+    cage = centre / (0.5 * pitch)
+    spin = (outer * outer_radius - inner * inner_radius) / ball - cage  # against the cage
+    return {
+        "cage": cage,
+        "outer_ring": balls * (cage - outer),
+        "inner_ring": balls * (inner - cage),
+        "larger_ball": 2 * (inner - cage),
+        "ball_spin": abs(spin),
+    }
+
+
+@pytest.mark.parametrize("ratio", [-100.0, 101.0])
+def test_orders_of_the_bearing_are_those_of_balls_that_roll(ratio: float) -> None:
+    effect = WaveGeneratorBearing(balls=21, ball_to_pitch_diameter=3.0 / 30.0)
+    output = 1.0 / ratio
+    # The flexspline is the output, or it stands still.
+    wanted = rolled(21, 3.0, 30.0, 1.0, output if ratio < 0 else 0.0)
+    for place, angle in wanted.items():
+        a, b = effect.angle_factors(BearingComponent(at=place), ratio)
+        assert a + b * output == pytest.approx(angle, rel=1e-12)
