@@ -25,9 +25,9 @@ class MeshPreload(Effect):
     title: ClassVar[str] = "mesh preload"
     source: ClassVar[str] = (
         "Harmonic Drive's catalogues state zero backlash of the teeth; Materials 2021, 14:5057 (drives are "
-        "usually designed with zero backlash at the mesh); two flanks: the paper's dead-zone, Eq. 14, for each; "
-        "no interference is published: the default, an estimate, presses a tooth of the paper's drive with 6 % "
-        "of its force at rated torque"
+        "usually designed with zero backlash at the mesh); two flanks: the paper's dead-zone, Eq. 14, each; "
+        "no interference is published: the default, an estimate, presses a tooth of the paper's drive with "
+        "6 % of its force at rated torque"
     )
     signature: ClassVar[Signature] = Signature(
         lives_in=("torque", "direction"),
