@@ -105,6 +105,7 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     ),
     "motor_torque_ripple, phases": (
         MotorTorqueRipple(components=(RippleComponent(order=7, cogging_nm=0.01, share=0.1, phase_deg=30),)),
+        InputCoulombViscous(coulomb_nm=0.03),  # what the windings give without a load
     ),
     "load_dependent_kinematic_error, phases": (
         LoadDependentKinematicError(
