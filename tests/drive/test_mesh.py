@@ -180,3 +180,16 @@ def test_a_lumped_mesh_knows_a_preload_only_as_less_play() -> None:
         model = Model(drive, parts, load_inertia_kg_m2=0.5)
         gaps.append(model._mesh_parameters()[1][_mesh_layout.EXTRA_GAP])
     assert gaps == [pytest.approx(0.1 * np.pi / 10800), 0.0]
+
+
+def test_the_widest_edge_shares_the_load_as_an_elliptical_flexspline() -> None:
+    """cos^2 over 45 degrees each side: half of the peak on average, a quarter of the teeth by weight."""
+    teeth = teeth_of({"half_gap_m": 0.0, "engagement": {"share": 0.25, "edge_teeth": 25.0}})
+    forces, angles = np.zeros(teeth.count), np.zeros(teeth.count)
+    _teeth.tooth_forces(teeth.parameters, teeth.lever_m * teeth.loaded(52.0)[0], 0.3, forces, angles)
+    from_axis = np.abs((angles + np.pi / 2) % np.pi - np.pi / 2)
+    bell = np.where(from_axis < np.pi / 4, np.cos(2 * from_axis) ** 2, 0.0)
+    peak = forces.max()
+    assert forces == pytest.approx(peak * bell, abs=0.05 * peak)
+    assert forces[bell > 0].mean() == pytest.approx(0.5 * peak, rel=0.02)
+    assert forces.sum() == pytest.approx(52.0 / teeth.lever_m, rel=1e-3)
