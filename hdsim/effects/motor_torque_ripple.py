@@ -60,8 +60,8 @@ class RippleComponent(Parameters):
     """One harmonic of the ripple."""
 
     order: float = Field(gt=0)
-    """Periods per motor turn: lcm(poles, slots) for cogging, 6 times the pole pairs for the windings; the pole
-    pairs themselves where a current sensor has an offset, a ripple as constant as cogging."""
+    """Periods per motor turn: lcm(poles, slots) for cogging, 6 times the pole pairs for the windings, the
+    pole pairs for the offset of a current sensor, a ripple as constant as cogging."""
     cogging_nm: Annotated[
         float,
         Plausible(
