@@ -64,7 +64,7 @@ class StiffnessComponent(Parameters):
         Plausible(
             0.005,
             0.2,
-            "estimate: an error of 1 to 40 arcsec at rated torque, size 20 at ratio 100",
+            "estimate: an error of 1 to 50 arcsec at rated torque, size 20 at ratio 100",
             of="stiffness_k1",
         ),
     ] = Field(1e3, ge=0)
@@ -89,11 +89,11 @@ class LoadDependentKinematicError(Effect):
 
     title: ClassVar[str] = "load-dependent kinematic error"
     source: ClassVar[str] = (
-        "Ghorbel, Gandhi and Alpeter 2001, J. Mech. Des. 123:90 (a pure kinematic error and a component of "
-        "the torsional flexibility; both vary with load and assembly); the balls of the wave generator's "
-        "bearing in the stiffness: Trans. JSME C 55(509):216, 1989; the law, a stiffness that is a function "
-        "of the angle, follows from one potential; the default, 15 arcsec at the rated 52 N m of a size 20 "
-        "drive, is an estimate"
+        "Ghorbel, Gandhi and Alpeter 2001, J. Mech. Des. 123:90 (what is measured is a pure kinematic error "
+        "and a part of the torsional flexibility, and depends on load and assembly); the balls of the oval "
+        "bearing in the stiffness: Trans. JSME C 55(509):216, 1989; the law, a stiffness over the angle, is "
+        "the plainest with one potential; the default, 15 arcsec at the rated 52 N m of a size 20 drive, is "
+        "an estimate"
     )
     signature: ClassVar[Signature] = Signature(
         lives_in=("wave_generator_angle", "torque"),
