@@ -152,7 +152,7 @@ class Builder(Protocol):
         """
 
     def widen_gap(self, half_gap_rad: float) -> None:
-        """Add to the half-gap of the mesh, as an angle at the output."""
+        """Add to the half-gap of the mesh, as an angle at the output; below zero teeth are pressed."""
 
     def signal(self, signal: Any) -> int:
         """Register a signal (``hdsim.actuation.signals``); returns the column of its value in the inputs.

@@ -74,7 +74,8 @@ def contact_border(p, x):  # type: ignore[no-untyped-def]
     """Angle from the major axis beyond which no tooth can touch at displacement x."""
     if p[KIND] == 0.0:
         return p[BORDER]
-    reach = (abs(x) + p[LARGEST_PITCH_ERROR] + p[SMOOTHING]) / p[CLEARANCE]
+    # Wear keeps teeth apart that a preload presses together.
+    reach = (abs(x) + p[LARGEST_PITCH_ERROR] + p[SMOOTHING] - min(p[EXTRA_GAP], 0.0)) / p[CLEARANCE]
     if reach >= 1.0:
         return 0.5 * math.pi
     return math.asin(math.sqrt(reach))
@@ -121,9 +122,11 @@ def window_potential(p, x, angle):  # type: ignore[no-untyped-def]
 def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
     """Sum over the teeth at common displacement x and ring angle a from the major axis.
 
+    With a preload (a negative extra gap) both flanks of a tooth may press at once: U(x - b) + U(-x - b).
     Returns V, V_x, V_xx, V_a, V_aa, V_xa and the number of teeth that carry load.
     """
-    if p[CONSTANT_GAPS_AT] > 0.0:
+    preloaded = p[EXTRA_GAP] < 0.0
+    if p[CONSTANT_GAPS_AT] > 0.0 and not preloaded:
         return window_potential(p, x, angle)
     teeth = int(p[TEETH])
     pitch = 2.0 * math.pi / teeth
@@ -174,36 +177,47 @@ def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
             tooth += 1
             if tooth == teeth:
                 tooth = 0
-            depth = abs(shifted) - gap
-            if depth <= -smoothing:
+            if abs(shifted) - gap <= -smoothing:
                 continue
             side = 1.0 if shifted > 0.0 else -1.0
-            by_x, by_gap, by_x2, by_x_gap = 1.0, -1.0, 0.0, 0.0
-            if smoothing > 0.0:
-                depth, by_x, by_gap, by_x2, by_x_gap = smooth_depth(abs(shifted), gap, smoothing)
-            energy, force, stiffness = hermite(p, contact_at, contact_step, contact_cells, depth)
-            if weight >= 0.5 and depth > 0.0:
-                engaged += 1
-            v += weight * energy
-            # by_x2 is the second derivative over the gap, too.
-            v_x += weight * force * by_x * side
-            v_xx += weight * (stiffness * by_x * by_x + force * by_x2)
-            v_a += slope * energy + weight * force * by_gap * gap_a
-            v_aa += (
-                curvature * energy
-                + 2.0 * slope * force * by_gap * gap_a
-                + weight
-                * ((stiffness * by_gap * by_gap + force * by_x2) * gap_a * gap_a + force * by_gap * gap_aa)
-            )
-            v_xa += side * (
-                slope * force * by_x + weight * (stiffness * by_x * by_gap + force * by_x_gap) * gap_a
-            )
+            # Without interference the far flank is out of touch wherever the near one is in touch.
+            for flank in range(2 if preloaded else 1):
+                depth = abs(shifted) - gap
+                by_x, by_gap, by_x2, by_x_gap = 1.0, -1.0, 0.0, 0.0
+                if preloaded:
+                    depth = (abs(shifted) if flank == 0 else -abs(shifted)) - gap
+                    if depth <= -smoothing:
+                        break
+                    if flank == 1:
+                        side = -side
+                    if smoothing > 0.0:
+                        depth, by_x, by_x2 = ramp(depth, smoothing)
+                        by_gap, by_x_gap = -by_x, -by_x2
+                elif smoothing > 0.0:
+                    depth, by_x, by_gap, by_x2, by_x_gap = smooth_depth(abs(shifted), gap, smoothing)
+                energy, force, stiffness = hermite(p, contact_at, contact_step, contact_cells, depth)
+                if weight >= 0.5 and depth > 0.0 and flank == 0:
+                    engaged += 1
+                v += weight * energy
+                # by_x2 is the second derivative over the gap, too.
+                v_x += weight * force * by_x * side
+                v_xx += weight * (stiffness * by_x * by_x + force * by_x2)
+                v_a += slope * energy + weight * force * by_gap * gap_a
+                curved = (stiffness * by_gap * by_gap + force * by_x2) * gap_a * gap_a
+                v_aa += curvature * energy + 2.0 * slope * force * by_gap * gap_a
+                v_aa += weight * (curved + force * by_gap * gap_aa)
+                v_xa += side * (
+                    slope * force * by_x + weight * (stiffness * by_x * by_gap + force * by_x_gap) * gap_a
+                )
     return v, v_x, v_xx, v_a, v_aa, v_xa, float(engaged)
 
 
 @_jit
 def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
-    """Every tooth's normal force (N, signed by flank) and angle from the major axis (rad, +- half a turn)."""
+    """Every tooth's normal force (N, signed by flank) and angle from the major axis (rad, +- half a turn).
+
+    Of a preloaded tooth it is the difference of its two flanks.
+    """
     teeth = int(p[TEETH])
     pitch = 2.0 * math.pi / teeth
     cells = int(p[GAP_CELLS])
@@ -223,11 +237,18 @@ def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
         at = int(p[GAP_AT]) + 4 * (tooth * cells + cell)
         gap += p[at] + s * (p[at + 1] + s * (p[at + 2] + s * p[at + 3]))
         shifted = x + p[int(p[PITCH_ERROR_AT]) + tooth]
-        depth, by_x = abs(shifted) - gap, 1.0
-        if p[SMOOTHING] > 0.0:
-            depth, by_x, _, _, _ = smooth_depth(abs(shifted), gap, p[SMOOTHING])
         forces[tooth] = 0.0
-        if depth > 0.0:
+        preloaded = p[EXTRA_GAP] < 0.0
+        for flank in range(2 if preloaded else 1):
             side = 1.0 if shifted > 0.0 else -1.0
-            force = by_x * hermite(p, int(p[CONTACT_AT]), p[CONTACT_STEP], p[CONTACT_CELLS], depth)[1]
-            forces[tooth] = weight * force * side
+            depth, by_x = abs(shifted) - gap, 1.0
+            if flank == 1:
+                side, depth = -side, -abs(shifted) - gap
+            if p[SMOOTHING] > 0.0:
+                if preloaded:
+                    depth, by_x, _ = ramp(depth, p[SMOOTHING])
+                else:
+                    depth, by_x, _, _, _ = smooth_depth(abs(shifted), gap, p[SMOOTHING])
+            if depth > 0.0:
+                force = by_x * hermite(p, int(p[CONTACT_AT]), p[CONTACT_STEP], p[CONTACT_CELLS], depth)[1]
+                forces[tooth] += weight * force * side

@@ -92,9 +92,8 @@ class Contributed:
         self._given.play |= play
 
     def widen_gap(self, half_gap_rad: float) -> None:
-        """Add to the half-gap of the mesh (rad at the output)."""
+        """Add to the half-gap of the mesh (rad at the output); see ``hdsim.parts.Builder.widen_gap``."""
         self._given.half_gap_rad += half_gap_rad
-        self._given.play |= half_gap_rad > 0
 
     def signal(self, signal: Any) -> int:
         """Register a signal; returns the column of its value."""

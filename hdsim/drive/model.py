@@ -82,7 +82,7 @@ class Model(Contributed):
             self._contribute_drive()
             for part in self.parts:
                 part.contribute(self)
-            self._has_play = self._given.play
+            self._has_play = self._given.play or self._given.half_gap_rad > 0.0
             self._own_before = len(self._given.states)
             self._names = {state.name: OWN + k for k, state in enumerate(self._given.states)}
             self.input_frictions = tuple(self._given.input_frictions)
@@ -136,7 +136,8 @@ class Model(Contributed):
             )
             parameters = np.zeros(_mesh_layout.HEADER)
             parameters[_mesh_layout.INVERSE_RATIO] = 1 / self.ratio
-            parameters[_mesh_layout.EXTRA_GAP] = self._given.half_gap_rad
+            # A lumped mesh has no teeth to press together: a preload only takes up play.
+            parameters[_mesh_layout.EXTRA_GAP] = max(self._given.half_gap_rad, 0.0)
             parameters[_mesh_layout.SPRING_STEP] = step
             parameters[_mesh_layout.SPRING_CELLS] = len(cells)
             parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER

@@ -130,7 +130,7 @@ class WindowEngagement(Parameters):
     share: float = Field(0.30, gt=0, le=0.9)
     """Share of the teeth that the arcs hold (sum of the weights over the number of teeth)."""
     edge_teeth: float = Field(8.0, gt=0)
-    """Teeth over which the weight rises from 0 to 1 at each end of an arc."""
+    """Teeth over which the weight rises from 0 to 1 at each end of an arc; over half of its teeth, a bell."""
 
 
 class ClearanceEngagement(Parameters):

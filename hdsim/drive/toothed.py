@@ -63,7 +63,8 @@ class Teeth:
         drive: the drive.
         mesh: its mesh section.
         wind_ups: springs that effects put in series, torque (N m) to twist (rad) at the output.
-        extra_half_gap_rad: half-gap beyond the surfaces' (wear), rad at the output.
+        extra_half_gap_rad: half-gap beyond the surfaces' (wear), or less than theirs (preload), rad at the
+            output.
         seed: seed of surfaces and pitch errors.
 
     Attributes:
@@ -114,10 +115,12 @@ class Teeth:
         self._place_gaps(seed)
         # Twice over, so that any run of neighbouring teeth is contiguous.
         header[place.PITCH_ERROR_AT] = self._place(np.tile(self.pitch_errors_m, 2))
+        # The wear comes last: the catalogue's stiffness belongs to the new drive, preload and all.
+        extra_gap = extra_half_gap_rad * self.scale * self.lever_m
+        header[place.EXTRA_GAP] = min(extra_gap, 0.0)
         self._place_engagement()
         self._place_structure(wind_ups)
-        # The wear comes last: the catalogue's stiffness belongs to the new drive.
-        header[place.EXTRA_GAP] = extra_half_gap_rad * self.scale * self.lever_m
+        header[place.EXTRA_GAP] = extra_gap
         if isinstance(mesh, TabulatedMesh):
             self._place_table(mesh)
         self.parameters = np.concatenate(self._blocks)

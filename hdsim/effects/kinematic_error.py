@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
 from hdsim.effects._fitting import Fitting, Harmonic, Periodic, Plausible
-from hdsim.effects._kernels import ARCMIN, harmonics
+from hdsim.effects._kernels import ARCMIN, Turn, factors, harmonics
 from hdsim.parts import Builder, Effect, Parameters, Signature
-
-Turn = Literal["wave_generator_turn", "output_turn", "relative_turn"]
 
 
 class ErrorComponent(Parameters):
@@ -87,6 +85,7 @@ class KinematicError(Effect):
             "heads cancel odd orders; on the motor it reaches the transmission error divided by "
             "the ratio",
             "damaged_tooth": "a short bump: many harmonics of one pass, in a narrow range of angle",
+            "load_dependent_kinematic_error": "grows with the torque and changes its sign with it",
         },
     )
     several: ClassVar[bool] = True
@@ -135,7 +134,5 @@ class KinematicError(Effect):
         """Add the harmonics to the mesh twist."""
         numbers = [float(len(self.components))]
         for c in self.components:
-            motor = 0.0 if c.per == "output_turn" else c.order
-            output = {"wave_generator_turn": 0.0, "output_turn": c.order, "relative_turn": -c.order}[c.per]
-            numbers += [c.amplitude, motor, output, math.radians(c.phase_deg)]
+            numbers += [c.amplitude, *factors(c.order, c.per), math.radians(c.phase_deg)]
         build.twist(harmonics, numbers)

@@ -44,6 +44,43 @@ def kinematic_expected(d: Drive, c: Changes) -> Expected:
     return found
 
 
+def uneven(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+    return {"uneven": 0.005 * d.stiffness[0] * x, "uneven_phase": phase(r[0]), "uneven_form": float(same)}
+
+
+def uneven_expected(d: Drive, c: Changes) -> Expected:
+    return {"components.0.stiffness_nm_per_rad": c["uneven"],
+            "components.0.phase_deg": math.degrees(c["uneven_phase"])}  # fmt: skip
+
+
+def lumpy(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+    size = 0.05 * d.coulomb * x
+    return {"lumpy_1": between(0.3, 1.0, r[0]) * size, "lumpy_1_phase": phase(r[1]), "lumpy_2": size,
+            "lumpy_2_phase": phase(r[2]), "lumpy_form": float(same)}  # fmt: skip
+
+
+def lumpy_expected(d: Drive, c: Changes) -> Expected:
+    found = {}
+    for k, name in enumerate(("lumpy_1", "lumpy_2")):
+        found[f"components.{k}.amplitude_nm"] = c[name]
+        found[f"components.{k}.phase_deg"] = math.degrees(c[f"{name}_phase"])
+    return found
+
+
+def warm(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+    return {"warm": 5e-4 * x, "warm_form": float(same), "heat_capacity": between(3, 10, r[0])}
+
+
+def ball(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
+    return {"ball": 0.05 * d.coulomb * x, "ball_phase": phase(r[0]), "ball_share": between(0.07, 0.12, r[1]),
+            "ball_form": float(same)}  # fmt: skip
+
+
+def ball_expected(d: Drive, c: Changes) -> Expected:
+    return {"components.0.friction_nm": c["ball"], "components.0.phase_deg": math.degrees(c["ball_phase"]),
+            "ball_to_pitch_diameter": c["ball_share"]}  # fmt: skip
+
+
 def generator_once(d: Drive, r: np.ndarray, x: float, same: bool) -> Changes:
     skew = 0.0 if same else between(0.1, 0.3, r[1])
     return {"wg_once": 1e-5 * x, "wg_once_phase": phase(r[0]), "wg_once_skew": skew}

@@ -15,7 +15,7 @@ import numpy as np
 from contract import Case, Kind
 from drawing import log_uniform
 from drives import DRIVES, GRAVITY, LEVER, around, base_yaml
-from hidden import ANY, EFFECTS, KINDS_OF, Changes, Expected, Hidden
+from hidden import ANY, EARLIER, EFFECTS, KINDS_OF, LATER, Changes, Expected, Hidden
 from outside import OUTSIDE
 from sensing import SENSORS, Setup, measure, numbers
 from strength import Strength, plain_strength, strength, unresolved
@@ -119,7 +119,8 @@ def wanted_of(number: int, seed: int, rng: np.random.Generator) -> Wanted:
     hidden: tuple[Hidden, ...] = ()
     strengths: tuple[float, ...] = ()
     if kind == "effect":
-        hidden = (EFFECTS[order.permutation(len(EFFECTS))[turn % len(EFFECTS)]],)
+        shuffled = [group[k] for group in (EARLIER, LATER) for k in order.permutation(len(group))]
+        hidden = (shuffled[turn % len(EFFECTS)],)
         strengths = (log_uniform(rng, *STRENGTH),)
     elif kind == "outside":
         hidden = (OUTSIDE[order.permutation(len(OUTSIDE))[turn % len(OUTSIDE)]],)
@@ -142,7 +143,7 @@ def wanted_of(number: int, seed: int, rng: np.random.Generator) -> Wanted:
 
 def _pair(rng: np.random.Generator) -> tuple[Hidden, ...]:
     while True:
-        one, other = (EFFECTS[k] for k in rng.choice(len(EFFECTS), 2, replace=False))
+        one, other = (EARLIER[k] for k in rng.choice(len(EARLIER), 2, replace=False))
         together = set(one.motions) & set(other.motions) & set(ANY)
         if together and not any({one.name, other.name} <= kind for kind in KINDS_OF):
             return one, other
@@ -180,6 +181,13 @@ def _sized(wanted: Wanted, rng: np.random.Generator, attempt: int) -> Sized | No
     return Sized(setups, held, changes, tuple(found), expected, max(misses))
 
 
+def measured_share(hidden: tuple[Hidden, ...]) -> float:
+    """Share of the records that hold the temperature."""
+    if any(h.temperature for h in hidden):
+        return 1.0
+    return 0.5 if any(h.name == "thermal_friction" for h in hidden) else 0.25
+
+
 def _setups(
     wanted: Wanted, rng: np.random.Generator, attempt: int
 ) -> tuple[tuple[Setup, ...], tuple[Setup, ...]]:
@@ -208,7 +216,7 @@ def _setups(
         seconds=max(5.0, seconds / count),
         seed=(int(rng.integers(2**31)), 0),
         sensors=sensors,
-        temperature=bool(rng.random() < (0.5 if any(h.name == "thermal_friction" for h in hidden) else 0.25)),
+        temperature=bool(rng.random() < measured_share(hidden)),
         noise=noise,
         torque_noise=torque_noise,
         step=log_uniform(rng, *STEP),

@@ -33,6 +33,7 @@ class Hidden:
         seconds: least length of a record, s.
         speed: factor on the motion's speed.
         expected: fields that should be recovered when the formula is the catalogue's.
+        temperature: is seen beside a measured temperature only.
     """
 
     name: str
@@ -47,12 +48,13 @@ class Hidden:
     seconds: float = 0.0
     expected: Callable[[Drive, Changes], Expected] | None = None
     speed: float = 1.0
+    temperature: bool = False
 
 
 HYSTERESIS = ("torsional_hysteresis_duhem", "torsional_hysteresis_maxwell")
 BY_TORQUE = ("swing", "moves", "chirp", "multisine", "locked")
 
-EFFECTS = (
+EARLIER = (
     Hidden(
         "kinematic_error",
         builders.kinematic,
@@ -266,14 +268,58 @@ EFFECTS = (
     ),
 )
 
+#: They have their turns after the others, and are in no pair: earlier keys draw what they have always drawn.
+LATER = (
+    Hidden(
+        "load_dependent_kinematic_error",
+        builders.uneven,
+        most=40,
+        limit="0.2 K1",
+        motions=("swing", "moves", "chirp", "multisine"),
+        arm=True,
+        expected=builders.uneven_expected,
+    ),
+    Hidden(
+        "position_dependent_friction",
+        builders.lumpy,
+        most=40,
+        limit="twice the Coulomb friction",
+        expected=builders.lumpy_expected,
+    ),
+    Hidden(
+        "thermal_stiffness",
+        builders.warm,
+        most=20,
+        limit="0.01 per kelvin",
+        motions=("swing", "moves", "multisine"),
+        arm=True,
+        seconds=20.0,
+        speed=3.0,
+        temperature=True,
+        expected=lambda d, c: {"stiffness_coefficient_per_k": c["warm"]},
+    ),
+    Hidden(
+        "wave_generator_bearing",
+        builders.ball,
+        most=40,
+        limit="twice the Coulomb friction",
+        motions=("swing", "moves", "constant", "multisine"),
+        seconds=15.0,
+        speed=3.0,
+        expected=builders.ball_expected,
+    ),
+)
+EFFECTS = (*EARLIER, *LATER)
+
 #: Effects of one kind can look alike; the two of a pair are of different kinds.
 KINDS_OF = (
     frozenset({"kinematic_error", "wave_generator_eccentricity", "damaged_tooth", "output_eccentricity",
-               "output encoder eccentricity", "output encoder delay"}),
+               "output encoder eccentricity", "output encoder delay", "load_dependent_kinematic_error"}),
     frozenset({"stribeck_friction", "lugre_friction", "load_side_friction", "input_coulomb_viscous",
-               "thermal_friction", "load_dependent_loss"}),
+               "thermal_friction", "load_dependent_loss", "position_dependent_friction",
+               "wave_generator_bearing"}),
     frozenset({"torsional_hysteresis_maxwell", "torsional_hysteresis_duhem", "output_backlash",
                "stiffness_nonlinearity", "flexspline_stiffening", "wave_generator_compliance",
-               "base_flexibility"}),
+               "base_flexibility", "thermal_stiffness"}),
     frozenset({"motor_torque_ripple", "unbalance", "unbalance of the rotor", "torque-sensor ripple"}),
 )  # fmt: skip

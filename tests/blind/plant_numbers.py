@@ -43,6 +43,10 @@ class Numbers(NamedTuple):
     wg_once_skew: float = 0.0
     out_once: float = 0.0
     out_once_phase: float = 0.0
+    # stiffness that varies with the motor's angle, order 2
+    uneven: float = 0.0
+    uneven_phase: float = 0.0
+    uneven_form: float = 0.0
     # damaged tooth
     bump: float = 0.0
     bump_at: float = 0.0
@@ -67,6 +71,17 @@ class Numbers(NamedTuple):
     loss_power: float = 1.0
     loss_scale: float = 1.0
     loss_form: float = 0.0
+    # that varies with the motor's angle, orders 1 and 2
+    lumpy_1: float = 0.0
+    lumpy_1_phase: float = 0.0
+    lumpy_2: float = 0.0
+    lumpy_2_phase: float = 0.0
+    lumpy_form: float = 0.0
+    # of a ball that is larger than the others, each time that it meets a lobe
+    ball: float = 0.0
+    ball_phase: float = 0.0
+    ball_share: float = 0.095
+    ball_form: float = 0.0
     thermal: float = 0.0
     heat_capacity: float = 8.0
     thermal_resistance: float = 1.5
@@ -118,6 +133,8 @@ class Numbers(NamedTuple):
     mount: float = 0.0  # compliance
     mount_inertia: float = 0.0
     mount_damping: float = 0.0
+    warm: float = 0.0  # softer by this share for every kelvin above 20 degC
+    warm_form: float = 0.0
     # sensors
     delay: float = 0.0
     encoder_once: float = 0.0

@@ -67,6 +67,16 @@ def error_of(m, o, p):
 
 
 @njit(cache=True)
+def uneven_at(m, p):
+    """What the spring is stiffer by at a motor angle, and its derivative."""
+    u = 2 * m + p.uneven_phase
+    # Else lobes of which one is sharper.
+    bend = 0.0 if p.uneven_form > 0 else 0.5
+    inside = u + bend * math.sin(u)
+    return p.uneven * math.sin(inside), 2 * p.uneven * math.cos(inside) * (1 + bend * math.cos(u))
+
+
+@njit(cache=True)
 def load_at(o, p):
     """Torque of the load that is a function of the output angle."""
     load = p.arm * math.sin(o) + p.weight * math.cos(o + p.weight_phase)
@@ -95,7 +105,12 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     housing = 1.0 - 1.0 / p.ratio
     twist = m / p.ratio + e - o + housing * b
     rate = wm * (1.0 / p.ratio + by_m) + wo * (by_o - 1.0) + housing * wb
-    tau = spring_torque(twist, table, reach, p) + p.damping * rate
+    # Else faster the warmer it is.
+    above = y[9] - 20.0
+    softer = p.warm * above * (1.0 if p.warm_form > 0 else 0.7 + 0.03 * above)
+    tau = spring_torque(twist, table, reach, p) * (1.0 - softer) + p.damping * rate
+    uneven, by_angle = uneven_at(m, p)
+    tau += uneven * twist
     if p.maxwell > 0:
         for k in range(SLIDERS):
             share, far = slider(k, p)
@@ -134,6 +149,17 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
             friction += p.extra_loss * level / abs(p.ratio) * math.tanh(wm / 0.5)
         else:
             friction += p.extra_loss * carried * (carried / p.loss_scale) ** (p.loss_power - 1.0) * sign
+    if p.lumpy_1 + p.lumpy_2 > 0:
+        once, twice = math.sin(m + p.lumpy_1_phase), math.sin(2 * m + p.lumpy_2_phase)
+        if p.lumpy_form > 0:
+            friction += (p.lumpy_1 * (1 + once) + p.lumpy_2 * (1 + twice)) * sign
+        else:
+            # Narrower where it is tight than where it is easy.
+            friction += (p.lumpy_1 * math.exp(once) + p.lumpy_2 * math.exp(twice)) * sign
+    if p.ball > 0:
+        # Ball diameter over pitch diameter; the outer ring turns with a flexspline that is the output.
+        met = math.sin((1.0 + p.ball_share) * (m - (o if p.ratio < 0 else 0.0)) + p.ball_phase)
+        friction += p.ball * (1.0 + met if p.ball_form > 0 else math.exp(met)) * sign
     friction += p.churn * wm * abs(wm)
     friction += p.zone * sign * math.exp(-(((o - p.zone_at) / p.zone_width) ** 2))
     if p.brake > 0:
@@ -152,7 +178,9 @@ def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
         load -= pull
         dy[7] = -pull / p.absorber_inertia
     dy[0] = wm
-    dy[1] = (drive - friction - tau * (1.0 / p.ratio + by_m)) / p.motor_inertia
+    # From the potential uneven twist^2 / 2.
+    back = tau * (1.0 / p.ratio + by_m) + 0.5 * twist * twist * by_angle
+    dy[1] = (drive - friction - back) / p.motor_inertia
     dy[2] = wo
     dy[3] = (tau * (1.0 - by_o) - load) / p.load_inertia
     if p.locked > 0:
@@ -249,7 +277,8 @@ def balance(p: Numbers, angle: float, table: np.ndarray, reach: float) -> np.nda
         low, high = -reach, reach
         for _ in range(60):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if spring_torque(middle, table, reach, p) < load else (low, middle)
+            pull = spring_torque(middle, table, reach, p) + uneven_at(motor, p)[0] * middle
+            low, high = (middle, high) if pull < load else (low, middle)
         housing = -(1.0 - 1.0 / p.ratio) * load * p.mount
         error, by_m, _ = error_of(motor, output, p)
         output = motor / p.ratio + error + (1.0 - 1.0 / p.ratio) * housing - 0.5 * (low + high)

@@ -177,8 +177,9 @@ def test_the_numbers_to_recover_are_those_of_the_plant(hidden, compared):
     """Put into the catalogue's effect, the numbers that count as the truth reproduce the plant's trace."""
     k = 4 if "locked" not in hidden.motions else 1
     setup = setup_of(
-        k, motion="moves", lacks=hidden.lacks, speed=hidden.speed, noise=0.5, torque_noise=0.5, rate=2000
-    )
+        k, motion="moves", lacks=hidden.lacks, speed=hidden.speed, noise=0.5, torque_noise=0.5, rate=2000,
+        temperature=hidden.temperature,
+    )  # fmt: skip
     changes = hidden.build(setup.drive, np.full(6, 0.3), 2.0 * hidden.start, True)
     name, label = OWN_NAME.get(hidden.name, (hidden.name, ""))
     expected = hidden.expected(setup.drive, changes)

@@ -13,37 +13,48 @@ from hdsim.drive import _mesh_layout, _teeth, _teeth_table
 from hdsim.drive.model import Model
 from hdsim.drive.parameters import Drive
 from hdsim.drive.presets import preset_names
+from hdsim.effects.mesh_preload import MeshPreload
 
 
-def teeth_of(mesh: dict[str, Any], **drive: Any) -> Any:
+def teeth_of(mesh: dict[str, Any], preload_arcmin: float = 0.0, **drive: Any) -> Any:
+    parts = [MeshPreload(interference_arcmin=preload_arcmin)] if preload_arcmin else []
     model = Model(
-        Drive.model_validate({"preset": "seed-2021", "mesh": mesh} | drive), [], load_inertia_kg_m2=0.5
+        Drive.model_validate({"preset": "seed-2021", "mesh": mesh} | drive), parts, load_inertia_kg_m2=0.5
     )
     assert model.teeth is not None
     return model.teeth
 
 
 def potential(teeth: Any, x: float, angle: float) -> float:
-    """Sum of w U(dead_zone(x + eps, b)) over all teeth, one by one in Python, from the contact law itself."""
+    """Sum of w U(dead_zone(x + eps, b)) over all teeth, one by one in Python, from the contact law itself.
+
+    With interference (b below zero) it is that of both flanks, U(x + eps - b) + U(-x - eps - b).
+    """
     engagement = teeth.mesh.engagement
-    depths, weights = np.zeros(teeth.count), np.ones(teeth.count)
+    depths, weights = np.zeros((2, teeth.count)), np.ones(teeth.count)
     for j in range(teeth.count):
         phi = (2 * np.pi * j / teeth.count + angle + np.pi / 2) % np.pi - np.pi / 2
-        gap = teeth.half_gaps_m[j]
+        gap = teeth.half_gaps_m[j] + teeth.parameters[_mesh_layout.EXTRA_GAP]
         if engagement.kind == "window":
             half, edge = engagement.share * np.pi / 2, engagement.edge_teeth * np.pi / teeth.count
             s = np.clip((half + edge - abs(phi)) / (2 * edge), 0, 1)
             weights[j] = s**3 * (10 - 15 * s + 6 * s**2)
         else:
             gap += teeth.parameters[_mesh_layout.CLEARANCE] * (1 - np.cos(2 * phi)) / 2
-        depths[j] = abs(dead_zone(x + teeth.pitch_errors_m[j], gap))
-    return float(weights @ teeth.law.energy(depths))
+        shifted = x + teeth.pitch_errors_m[j]
+        if gap >= 0:
+            depths[0, j] = abs(dead_zone(shifted, gap))
+        else:
+            depths[:, j] = np.maximum([shifted - gap, -shifted - gap], 0.0)
+    return float(teeth.law.energy(depths).sum(axis=0) @ weights)
 
 
+@pytest.mark.parametrize("preload_arcmin", [0.0, 0.3])
 @pytest.mark.parametrize("kind", ["window", "clearance"])
-def test_potential_is_the_sum_over_the_teeth(kind: str) -> None:
-    teeth = teeth_of({"engagement": {"kind": kind}, "pitch_error_m": 5e-7})
-    for x in (-3e-6, -5e-7, 1e-6, 2.5e-6, 5e-6):
+def test_potential_is_the_sum_over_the_teeth(kind: str, preload_arcmin: float) -> None:
+    teeth = teeth_of({"engagement": {"kind": kind}, "pitch_error_m": 5e-7}, preload_arcmin)
+    # A preloaded tooth is at the end of the contact's table earlier.
+    for x in (-3e-6, -5e-7, 1e-7, 1e-6, 2.5e-6, 3.5e-6 if preload_arcmin else 5e-6):
         for angle in (0.0, 0.3, 2.9, -17.0):
             compiled = _teeth.teeth_potential(teeth.parameters, x, angle)[0]
             assert compiled == pytest.approx(potential(teeth, x, angle), rel=2e-5, abs=1e-12)
@@ -53,6 +64,10 @@ MESHES = {
     "window": teeth_of({}),
     "clearance": teeth_of({"engagement": {"kind": "clearance"}}),
     "flank": teeth_of({"gap_along_flank": True, "pitch_error_m": 1e-6}),
+    "preload": teeth_of({}, 0.4),
+    "preload, smooth": teeth_of(
+        {"gap_smoothing_m": 2e-7, "gap_along_flank": True, "engagement": {"kind": "clearance"}}, 0.4
+    ),
     "smooth": teeth_of(
         {"gap_smoothing_m": 2e-7, "gap_along_flank": True, "engagement": {"kind": "clearance"}}
     ),
@@ -102,9 +117,10 @@ def test_tooth_forces_add_up_to_the_mesh_force() -> None:
 
 
 def test_contact_never_pulls() -> None:
-    for teeth in MESHES.values():
+    for name, teeth in MESHES.items():
         forces, angles = np.zeros(teeth.count), np.zeros(teeth.count)
-        for x in (-1e-5, 1e-5):
+        # Pressed between two teeth each is pushed both ways, more by the nearer one.
+        for x in (-1e-5, 1e-5, *((-1e-7, 1e-7) if "preload" in name else ())):
             _teeth.tooth_forces(teeth.parameters, x, 0.7, forces, angles)
             assert np.all(np.sign(forces) * np.sign(x) >= 0)
 
@@ -151,3 +167,44 @@ def test_compliance_budget_adds_up_to_the_catalogue() -> None:
     chain = MESHES["window"].chain()
     assert sum(chain.values()) == pytest.approx(1.0, abs=1e-12)
     assert all(share >= 0 for share in chain.values())
+
+
+def test_a_preloaded_mesh_has_no_play_and_carries_load_at_rest() -> None:
+    loose, tight = MESHES["window"], MESHES["preload"]
+    at_rest = [_teeth.teeth_potential(teeth.parameters, 0.0, 0.3) for teeth in (loose, tight)]
+    assert at_rest[0][6] == 0
+    assert at_rest[1][6] == pytest.approx(0.30 * tight.count, abs=3)
+    # In balance to what the teeth's rounding leaves, with the stiffness of both flanks.
+    assert abs(at_rest[1][1]) < 1e-9 * tight.rated_tooth_force_n
+    deep = 0.4 * np.pi / 10800 * tight.scale * tight.lever_m - tight.half_gaps_m
+    pressed = 2 * 0.30 * tight.count * float(tight.law.stiffness(np.maximum(deep, 0.0)).mean())
+    assert at_rest[1][2] == pytest.approx(pressed, rel=0.15)
+    # The catalogue's stiffness is that of either drive: what the play takes, the structure gives.
+    for teeth in (loose, tight):
+        whole = teeth.wind_up(52.0) + float(teeth.structure_wind_up(np.array(52.0)))
+        assert whole == pytest.approx(7 / 1.6e4 + 18 / 2.5e4 + 27 / 2.9e4, rel=2e-3)
+
+
+def test_a_lumped_mesh_knows_a_preload_only_as_less_play() -> None:
+    from hdsim.effects.output_backlash import OutputBacklash
+
+    drive = Drive.model_validate({"preset": "seed-2021", "mesh": {"model": "lumped"}})
+    gaps = []
+    for preload in (0.1, 0.6):
+        parts = [OutputBacklash(backlash_arcmin=0.4), MeshPreload(interference_arcmin=preload)]
+        model = Model(drive, parts, load_inertia_kg_m2=0.5)
+        gaps.append(model._mesh_parameters()[1][_mesh_layout.EXTRA_GAP])
+    assert gaps == [pytest.approx(0.1 * np.pi / 10800), 0.0]
+
+
+def test_the_widest_edge_shares_the_load_as_an_elliptical_flexspline() -> None:
+    """cos^2 over 45 degrees each side: half of the peak on average, a quarter of the teeth by weight."""
+    teeth = teeth_of({"half_gap_m": 0.0, "engagement": {"share": 0.25, "edge_teeth": 25.0}})
+    forces, angles = np.zeros(teeth.count), np.zeros(teeth.count)
+    _teeth.tooth_forces(teeth.parameters, teeth.lever_m * teeth.loaded(52.0)[0], 0.3, forces, angles)
+    from_axis = np.abs((angles + np.pi / 2) % np.pi - np.pi / 2)
+    bell = np.where(from_axis < np.pi / 4, np.cos(2 * from_axis) ** 2, 0.0)
+    peak = forces.max()
+    assert forces == pytest.approx(peak * bell, abs=0.05 * peak)
+    assert forces[bell > 0].mean() == pytest.approx(0.5 * peak, rel=0.02)
+    assert forces.sum() == pytest.approx(52.0 / teeth.lever_m, rel=1e-3)

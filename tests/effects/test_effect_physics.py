@@ -258,6 +258,16 @@ def test_cogging_does_no_work_over_a_period_and_the_windings_share_follows_the_l
     )
 
 
+def test_without_a_load_the_windings_ripple_is_a_share_of_the_friction() -> None:
+    ripple = MotorTorqueRipple(components=(RippleComponent(order=6, share=0.02),))
+    friction = InputCoulombViscous(coulomb_nm=0.03, viscous_nm_s_per_rad=2e-4)
+    place = {"MOTOR_ANGLE": math.pi / 12, "MOTOR_VELOCITY": 200.0}
+    alone = at(Model(friction, base=1e-4), **place)[k.MOTOR_TORQUE]
+    together = at(Model(friction, ripple, base=1e-4), **place)[k.MOTOR_TORQUE]
+    assert alone == pytest.approx(-(0.03 + 3e-4 * 200))
+    assert together == pytest.approx(0.98 * alone)
+
+
 def soak(
     effect: ThermalFriction, speed: float, base: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray, Model]:

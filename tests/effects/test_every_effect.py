@@ -20,12 +20,16 @@ from hdsim.effects._fitting import range_of, scales_of
 from hdsim.effects.base_flexibility import BaseFlexibility
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
+from hdsim.effects.load_dependent_kinematic_error import LoadDependentKinematicError, StiffnessComponent
 from hdsim.effects.load_dependent_loss import LoadDependentLoss
 from hdsim.effects.lugre_friction import LugreFriction
 from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
+from hdsim.effects.position_dependent_friction import FrictionComponent, PositionDependentFriction
 from hdsim.effects.thermal_friction import ThermalFriction
+from hdsim.effects.thermal_stiffness import ThermalStiffness
 from hdsim.effects.torsional_hysteresis_maxwell import SlipElement, TorsionalHysteresisMaxwell
 from hdsim.effects.unbalance import Unbalance
+from hdsim.effects.wave_generator_bearing import BearingComponent, WaveGeneratorBearing
 from hdsim.parts import Effect
 
 COORDINATES = {
@@ -85,6 +89,15 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
         ThermalFriction(coulomb_nm=0.03, viscous_nm_s_per_rad=1e-3),
         InputCoulombViscous(coulomb_nm=0.03),  # the friction that it changes
     ),
+    "thermal_stiffness, warming": (ThermalStiffness(), ThermalFriction()),
+    "wave_generator_bearing, cage": (
+        WaveGeneratorBearing(
+            components=(
+                BearingComponent(at="cage", harmonic=2, friction_nm=0.01, error_arcmin=0.2, phase_deg=40),
+                BearingComponent(at="ball_spin", friction_nm=0.02),
+            )
+        ),
+    ),
     "maxwell, given elements": (
         TorsionalHysteresisMaxwell(
             elements=(SlipElement(stiffness_nm_per_rad=4000, slip_torque_nm=0.7),), sharpness=3
@@ -92,6 +105,23 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     ),
     "motor_torque_ripple, phases": (
         MotorTorqueRipple(components=(RippleComponent(order=7, cogging_nm=0.01, share=0.1, phase_deg=30),)),
+        InputCoulombViscous(coulomb_nm=0.03),  # what the windings give without a load
+    ),
+    "load_dependent_kinematic_error, phases": (
+        LoadDependentKinematicError(
+            components=(
+                StiffnessComponent(order=2.5, stiffness_nm_per_rad=700, phase_deg=40, per="relative_turn"),
+                StiffnessComponent(order=3, stiffness_nm_per_rad=300, phase_deg=-70, per="output_turn"),
+            )
+        ),
+    ),
+    "position_dependent_friction, phases": (
+        PositionDependentFriction(
+            components=(
+                FrictionComponent(order=2.5, amplitude_nm=0.01, phase_deg=40, per="relative_turn"),
+                FrictionComponent(order=3, amplitude_nm=0.02, phase_deg=-70, per="output_turn"),
+            )
+        ),
     ),
     "base_flexibility, housing": (BaseFlexibility(stiffness_nm_per_rad=3e5, natural_frequency_hz=70),),
     "load_dependent_loss, by direction": (LoadDependentLoss(coefficient=0.2, back_driving_coefficient=0.05),),
