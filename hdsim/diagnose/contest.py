@@ -15,7 +15,6 @@ import numpy as np
 
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, designs
-from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit, at_present, fit, sharpened
@@ -37,7 +36,7 @@ FAR = 0.7
 FARTHEST = 2.0
 #: Part of the drive's compliance that the screen may give to an effect in series.
 SOFTEST = 0.85
-#: Part by which a law of compliance must leave more than one that it looks like to be fitted from there too.
+#: Part by which a law of compliance must leave more than the best of them to be fitted from there too.
 LAGS = 0.1
 #: Part of the screen's coefficient at which a compliance's fit, or one that led astray, begins a second time.
 SMALL = 0.2
@@ -139,22 +138,18 @@ def _after_the_best(
     keep: Callable[[str, list[Fit]], None],
     tell: Callable[[str], object],
 ) -> None:
-    """Fit laws of compliance that look like the best one from the numbers to which that one led the base.
+    """Fit laws of compliance from the numbers to which the best of them led the base.
 
     The base without any of them is far from where each would have it, and the way there is bent.
     """
-    noise = sum(bench.noise_powers.values())
-    name = min(best, key=lambda name: best[name][0])
+    series = [one for one in shortlist if one.added.fitting.in_series]
+    if len(series) < 2 or not any(one.name in best for one in series):
+        return
+    name = min((one.name for one in series if one.name in best), key=lambda name: best[name][0])
     loss, leader = best[name]
-    rivals = [
-        one
-        for one in shortlist
-        if one.name != name
-        and one.added.fitting.in_series
-        and confusable(one.name, name)
-        and best.get(one.name, (math.inf, None))[0] > (1.0 + LAGS) * max(loss, noise)
-    ]
-    if not rivals or not leader.state.added[-1].fitting.in_series:
+    enough = (1.0 + LAGS) * max(loss, sum(bench.noise_powers.values()))
+    rivals = [one for one in series if best.get(one.name, (math.inf, None))[0] > enough]
+    if not rivals:
         return
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         there = _at(bench, base, leader.theta)
@@ -162,12 +157,6 @@ def _after_the_best(
             tell(f"fitting {one.name} from where {name} led")
             for shapes in product(*(shape.starts for shape in one.added.fitting.shapes)):
                 keep(one.name, _from(bench, base, there, replace(one.added, shapes=shapes)))
-
-
-def confusable(one: str, other: str) -> bool:
-    """Whether one of two effects says that it can look like the other."""
-    known = catalogue()
-    return other in known[one].signature.confused_with or one in known[other].signature.confused_with
 
 
 def against_priors(bench: Bench, results: Sequence[tuple[str, Fit, Array]]) -> list[tuple[str, Fit, Array]]:

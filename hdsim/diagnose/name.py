@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnose.contest import against_priors, confusable, contest
+from hdsim.diagnose.contest import against_priors, contest
 from hdsim.diagnose.evidence import CandidateEvidence
 from hdsim.diagnose.screen import Residual
 from hdsim.diagnose.traces import Screened, Screening
@@ -114,9 +114,12 @@ def name_effect(
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
     shortlist = [one for one in shortlist if _could_win(one, best)][:SHORTLIST]
     softer = any(free.compliance and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True))
-    if softer and any(one.added.fitting.in_series for one in shortlist):
+    series = [one for one in screening.ranked if one.added.fitting.in_series]
+    if softer and any(
+        one in series or any(confusable(one.name, other.name) for other in series) for one in shortlist
+    ):
         # The re-fit may have taken any compliance in series for the drive's own.
-        shortlist += [one for one in screening.ranked if one.added.fitting.in_series and one not in shortlist]
+        shortlist += [one for one in series if one not in shortlist]
     with bench.coarse():
         results = contest(bench, base, shortlist, residual, on_step)
     if not results:
@@ -228,6 +231,12 @@ def freedom(found: Fit) -> int:
     """Free numbers of a fit's last effect; orders that are read from the data are, too."""
     added = found.state.added[-1]
     return len(added.coefficients) + len(added.shapes) + len(added.orders)
+
+
+def confusable(one: str, other: str) -> bool:
+    """Whether one of two effects says that it can look like the other."""
+    known = catalogue()
+    return other in known[one].signature.confused_with or one in known[other].signature.confused_with
 
 
 def beside(residual: Residual, one: Screened, other: Screened) -> bool:
