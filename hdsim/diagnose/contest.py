@@ -264,9 +264,10 @@ def _linear(base: Fit, point: _Point, added: Added, columns: Array, power: float
     lower, upper = (end[:n] - x0[:n] for end in vector.bounds())
     far = np.where(np.arange(n) < len(base.frees), FARTHEST, np.inf)
     bounds = np.minimum(np.maximum(lower, -far), 0.0), np.maximum(np.minimum(upper, far), 0.0)
-    root = np.linalg.cholesky(both.T @ both / power + np.diag(priors**-2))
-    aim = both.T @ point.left / power + (vector.centre(x0) - x0)[:n] / priors**2
-    found = lsq_linear(root.T, np.linalg.solve(root, aim), bounds).x
+    worth = 1.0 / math.sqrt(power)
+    q, r = np.linalg.qr(np.vstack([worth * both, np.diag(1.0 / priors)]))
+    aim = np.concatenate([worth * point.left, (vector.centre(x0) - x0)[:n] / priors])
+    found = lsq_linear(r, q.T @ aim, bounds).x
     return found[:p], found[p:]
 
 

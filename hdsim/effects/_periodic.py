@@ -48,6 +48,10 @@ class Periodic(Term):
         """As those of a harmonic."""
         return True
 
+    def bounds(self, limits: Limits) -> tuple[float, float]:
+        """As those of a harmonic."""
+        return self.harmonic(0).bounds(limits)
+
     @property
     def list_path(self) -> str:  # type: ignore[override]
         """Its list."""

@@ -246,14 +246,21 @@ class Harmonic(Term):
         """Both have a sign."""
         return True
 
+    def bounds(self, limits: Limits) -> tuple[float, float]:
+        """The square within the circle of the largest amplitude: whatever the phase, it is legal."""
+        _, high = limits(self.amplitude)
+        most = (1.0 - INSIDE) * high / (math.sqrt(2.0) * self.unit)
+        return -most, most
+
     def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
         """Amplitude and phase from the two coefficients."""
         put(data, self.amplitude, self.unit * math.hypot(*c))
         put(data, self.phase, math.degrees(math.atan2(c[1], c[0])))
 
     def at_end(self, c: Values, plausible: Limits) -> bool:
-        """The amplitude at its upper end; a phase has none."""
-        return _strongest(self.unit * math.hypot(*c), *plausible(self.amplitude))
+        """A side of the square that ``bounds`` allows, or the amplitude's upper end; a phase has none."""
+        widest = max(math.hypot(*c), math.sqrt(2.0) * max(abs(x) for x in c))
+        return _strongest(self.unit * widest, *plausible(self.amplitude))
 
     def rescaled(self, factor: float) -> Self:
         """The unit times the factor."""

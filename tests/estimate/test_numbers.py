@@ -255,3 +255,19 @@ def _empty():
     from hdsim.estimate.state import State
 
     return State(None, None, {})
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_whatever_a_fits_bounds_allow_is_a_legal_effect(name):
+    for fitting in catalogue()[name].fittings:
+        if any(shape.over_range for shape in fitting.shapes) or any(term.of_range for term in fitting.terms):
+            fitting = fitting.within({"torque_nm": 50.0, "motor_side_torque_nm": 0.5, "twist_arcmin": 5.0})
+        periodic = any(isinstance(term, Periodic) for term in fitting.terms)
+        orders = (1.0, 2.0) if periodic else ()
+        units = (1.0,) * fitting.count(orders)
+        added = Added(name, fitting, units, tuple(s.starts[0] for s in fitting.shapes), orders)
+        ends = np.array(fitting.bounds(added.limits, orders))
+        for side in (0, 1):
+            corner = np.where(np.isfinite(ends[:, side]), ends[:, side], (-1e7, 1e7)[side])
+            effect = replace(added, coefficients=tuple(np.where(corner == 0.0, 1e-6, corner)))
+            catalogue()[name].model_validate(effect.settings())
