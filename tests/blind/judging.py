@@ -88,10 +88,19 @@ def _named(line: Line, truth: set[str], at: dict[str, Any] | None) -> bool:
             return True
         for one in components:
             size = one.get(at["field"])
+            if size is not None and at["field"] == "cogging_nm":
+                # What was put in is what the current reads; what is fitted is the torque behind its gain.
+                size *= _gain_of(line)
             same = abs(one.get("order", 0.0) / at["order"] - 1.0) < 0.01 and one.get("per") != "output_turn"
             if same and (size is None or 0.5 < abs(size / at["size"]) < 2.0):
                 return True
     return False
+
+
+def _gain_of(line: Line) -> float:
+    """Reading over torque of the motor's channel, as fitted."""
+    found = (line["verdict"] or {}).get("parameters", {}).get("motor_torque_gain")
+    return float(found["value"]) if found else 1.0
 
 
 def _components(effect: dict[str, Any]) -> list[dict[str, Any]]:

@@ -68,9 +68,10 @@ by (down to {LEAST_NOISE:g} times the usual noise), and in the end the nearest t
 strengths in the tables are those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
-page of this version none is left out. Its statement cases are of a seed of which nothing had been seen when the
-search and the rules were last changed: all whose turn came in the time there was. Calibration cases are of several
-states of the search, each as it was last run.
+page of this version none is left out. Its statement cases are of a seed of which nothing had been seen when
+the search and the rules were last changed: all whose turn came in the time there was. How recordings are
+judged was mended afterwards: a ripple's size is compared as the current reads it, behind the fitted gain.
+Calibration cases are of several states of the search, each as it was last run.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, evidence and all: `python tests/blind page`
 writes it from them, and `decide` can judge every one again.

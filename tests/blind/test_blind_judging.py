@@ -200,3 +200,19 @@ def test_bands_and_rates():
     assert band(line("effect", ONE, "unknown", strength=120.0)) == "35 to 100"
     # 10 of 10: the lower end is 0.025^(1/10) (Clopper and Pearson 1934).
     assert rate(10, 10) == f"100 % ({100 * 0.025**0.1:.0f} to 100)"
+
+
+def test_the_size_of_a_motors_ripple_is_what_its_current_reads():
+    ripple = {"order": 6.0, "cogging_nm": 0.12}
+    effect = {"name": "motor_torque_ripple", "indistinguishable_from": [], "confidence": 0.9, "parameters": {},
+              "settings": {"components": [ripple]}}  # fmt: skip
+    said = {"verdict": "effect", "suspects": {}, "effects": [effect]}
+    at = {"order": 6.0, "field": "cogging_nm", "size": 0.05}
+    one = line("effect", [["motor_torque_ripple"]], "") | {"setup": {"at": at, "own": []}, "verdict": said}
+    one["without"] = {"verdict": {"verdict": "nothing", "suspects": {}, "effects": []}}
+    assert outcome(one) == "nothing"
+    said["parameters"] = {"motor_torque_gain": {"value": 0.5}}
+    assert outcome(one) == "right"
+    # A component of the output's turn is another order.
+    ripple["per"] = "output_turn"
+    assert outcome(one) == "nothing"
