@@ -204,8 +204,8 @@ def test_bands_and_rates():
 
 def test_the_size_of_a_motors_ripple_is_what_its_current_reads():
     ripple = {"order": 6.0, "cogging_nm": 0.12}
-    effect = {"name": "motor_torque_ripple", "indistinguishable_from": [], "confidence": 0.9, "parameters": {},
-              "settings": {"components": [ripple]}}  # fmt: skip
+    effect = {"name": "motor_torque_ripple", "indistinguishable_from": [], "confidence": 0.9}
+    effect |= {"parameters": {}, "settings": {"components": [ripple]}}
     said = {"verdict": "effect", "suspects": {}, "effects": [effect]}
     at = {"order": 6.0, "field": "cogging_nm", "size": 0.05}
     one = line("effect", [["motor_torque_ripple"]], "") | {"setup": {"at": at, "own": []}, "verdict": said}
