@@ -127,8 +127,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     ]
     left = law.own_left
     if law.exact and law.own_first:
-        # Little beside what it explains speaks as little against it as little beside the noise.
-        left = min(left, evidence.left if evidence.left_chance <= rules.chance else 0.0)
+        left = evidence.left if evidence.left_chance <= rules.chance else 0.0
     found.append(
         (
             "part of the structure in its own coordinate that it leaves",

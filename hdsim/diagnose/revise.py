@@ -26,8 +26,6 @@ EXCESS = 0.05
 #: Part of what would be missing without it below which a name is taken back (chosen: of calibration cases
 #: right ones have 0.8 to 1, wrong ones 0.1 to 0.35 and, once, 0.9).
 NEEDLESS = 0.1
-#: The same part from which no more steps of the others would change much (chosen, as above).
-CLEARLY = 0.8
 
 
 def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str], object]) -> Fit:
@@ -47,7 +45,7 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
             one.needed, one.worth = 1.0, math.inf
             if rest is not None:
                 one.needed = needed(bench, rest, current)
-                if len(named) > 2 and NEEDLESS <= one.needed < CLEARLY:
+                if len(named) > 2 and one.needed >= NEEDLESS:
                     # Of two names neither can have been needed for the sake of the other alone.
                     rest = settled(bench, rest)
                     one.needed = needed(bench, rest, current)

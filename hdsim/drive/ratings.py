@@ -255,12 +255,13 @@ def ratings(name: str) -> Ratings:
 def ratings_of_preset(preset: str) -> Ratings | None:
     """What the gear of a preset may carry; None where nothing is on record.
 
-    The paper behind ``seed-2021`` prints geometry and rated torque alone; the rest is CSG size 20, ratio 100.
+    The paper behind ``seed-2021`` (with either roughness) prints geometry and rated torque alone; the rest is
+    CSG size 20, ratio 100.
 
     Args:
         preset: name of a preset.
     """
-    return _ALL.get("csg-20-100" if preset == "seed-2021" else preset)
+    return _ALL.get("csg-20-100" if preset.startswith("seed-2021") else preset)
 
 
 def bearing_life_h(gear: Ratings, average_torque_nm: float, average_input_speed_rpm: float) -> float:

@@ -69,7 +69,8 @@ strengths in the tables are those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
 page of this version none is left out. Its statement cases are of a seed of which nothing had been seen when
-the search and the rules were last changed: all whose turn came in the time there was. How recordings are
+the search was last changed: all whose turn came in the time there was. A rule that was tried then and taken
+back had given a right name to one recording; it is judged by the rules as they are. How recordings are
 judged was mended afterwards: a ripple's size is compared as the current reads it, behind the fitted gain.
 Calibration cases are of several states of the search, each as it was last run.
 
