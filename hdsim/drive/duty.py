@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from hdsim.drive.ratings import bearing_life_h
 
 if TYPE_CHECKING:
+    from hdsim.drive.printed import Figure
     from hdsim.drive.ratings import Ratings
 
 #: Passes of a lobe over a place of the flexspline that it stands under a momentary peak torque (Eq. 18.10).
@@ -64,6 +65,16 @@ def bearing_averages(
         float(np.trapezoid(travel, time_s)),
         float(np.trapezoid(travel * np.abs(torque_nm) ** 3, time_s)),
     )
+
+
+def averages(duration_s: float, travel_rad: float, cubed: float) -> tuple[float, float]:
+    """Cubic mean of the torque in N m and mean input speed in rpm, of what ``bearing_averages`` sums up.
+
+    Both 0 where nothing turns.
+    """
+    if travel_rad == 0.0:
+        return 0.0, 0.0
+    return (cubed / travel_rad) ** (1.0 / 3.0), travel_rad / duration_s * 30.0 / math.pi
 
 
 @dataclass(frozen=True)
@@ -126,7 +137,7 @@ class Check:
 
     @property
     def margin(self) -> float | None:
-        """Allowed over asked (inverted for a life): 1 is just enough; None where nothing is printed."""
+        """Allowed over asked (a life: reached over wanted), 1 is just enough; None if nothing is printed."""
         if self.allowed is None:
             return None
         return math.inf if self.asked == 0.0 else self.allowed / self.asked
@@ -148,19 +159,9 @@ def checks(gear: Ratings, duty: Duty) -> list[Check]:
     """Every limit of a gear against a duty, in the order of the makers' procedure."""
     found: list[Check] = []
 
-    def add(name: str, unit: str, asked: float, figure: object) -> None:
-        from hdsim.drive.printed import Figure
-
-        known = figure if isinstance(figure, Figure) else None
-        found.append(
-            Check(
-                name,
-                unit,
-                asked,
-                known.value if known else None,
-                source=known.source.citation if known else "",
-            )
-        )
+    def add(name: str, unit: str, asked: float, figure: Figure | None) -> None:
+        allowed = figure.value if figure else None
+        found.append(Check(name, unit, asked, allowed, source=figure.source.citation if figure else ""))
 
     average_input = gear.ratio * duty.average_speed_rpm
     add("average torque", "N m", duty.average_torque_nm, gear.average_torque)

@@ -252,15 +252,17 @@ def ratings(name: str) -> Ratings:
     return _ALL[name]
 
 
-def ratings_of_preset(preset: str) -> Ratings | None:
-    """What the gear of a preset may carry; None where nothing is on record.
+def ratings_of_preset(preset: str | None) -> Ratings | None:
+    """What the gear of a preset may carry; None where nothing is on record, or the drive is no preset.
 
     The paper behind ``seed-2021`` (with either roughness) prints geometry and rated torque alone; the rest is
     CSG size 20, ratio 100.
 
     Args:
-        preset: name of a preset.
+        preset: name of a preset, or None.
     """
+    if preset is None:
+        return None
     return _ALL.get("csg-20-100" if preset.startswith("seed-2021") else preset)
 
 

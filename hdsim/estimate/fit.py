@@ -66,17 +66,14 @@ class Fit:
 
     def ordered(self, effects: Sequence[int]) -> Fit:
         """The same fit with its effects in another order."""
-        order = [*range(len(self.frees)), *(k for e in effects for k in _range(self.numbers_of(e)))]
+        numbers = np.arange(self.columns.shape[1])
+        order = np.concatenate([numbers[: len(self.frees)], *(numbers[self.numbers_of(e)] for e in effects)])
         return replace(
             self,
             state=replace(self.state, added=tuple(self.state.added[e] for e in effects)),
             covariance=self.covariance[np.ix_(order, order)],
             columns=self.columns[:, order],
         )
-
-
-def _range(part: slice) -> range:
-    return range(part.start, part.stop)
 
 
 def fit(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fnmatch import fnmatch
 
-from hdsim.errors import InputError
 from hdsim.reproduce import backlash, drive, equations, identification, stiffness  # noqa: F401 - they register
 from hdsim.reproduce.rows import CHECKS, Row
+from hdsim.rows import chosen, made
 
 #: The paper's order, as patterns of names.
 _ORDER = (
@@ -31,13 +31,4 @@ def compute(only: Iterable[str] = ()) -> list[Row]:
     Raises:
         InputError: when a pattern matches nothing.
     """
-    known = names()
-    patterns = list(only)
-    for pattern in patterns:
-        if not any(fnmatch(name, pattern) for name in known):
-            raise InputError(f"nothing to reproduce is called {pattern!r}; there are: {', '.join(known)}")
-    wanted = [n for n in known if not patterns or any(fnmatch(n, p) for p in patterns)]
-    rows: list[Row] = []
-    for function in dict.fromkeys(CHECKS[name] for name in wanted):
-        rows += [row for row in function() if row.name in wanted]
-    return sorted(rows, key=lambda row: wanted.index(row.name))
+    return made(CHECKS, chosen(names(), only, "nothing to reproduce"), lambda function: function())

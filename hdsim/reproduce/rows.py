@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from hdsim.rows import registrar
+
 
 class Verdict(StrEnum):
     """How the paper fares; ``DEFINITIONS`` says what each means."""
@@ -65,13 +67,4 @@ Check = Callable[[], Iterable[Row]]
 #: What makes a row, by its name.
 CHECKS: dict[str, Check] = {}
 
-
-def check(*names: str) -> Callable[[Check], Check]:
-    """Register a function that makes the rows of these names."""
-
-    def register(function: Check) -> Check:
-        for name in names:
-            CHECKS[name] = function
-        return function
-
-    return register
+check = registrar(CHECKS)

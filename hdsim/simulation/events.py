@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hdsim.drive.ratings import ratings_of_preset
 from hdsim.recording import Event
-from hdsim.simulation.limits import Bearing, gear_of, speed_watches, torque_watches
+from hdsim.simulation.limits import Bearing, speed_watches, torque_watches
 from hdsim.simulation.watches import Flanks, Watch
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class EventDetector:
                 rated * margin,
             )
         ]
-        gear = gear_of(self.model)
+        gear = ratings_of_preset(self.model.drive.preset)
         self._output += [] if gear is None else torque_watches(gear, margin)
         self._input = [] if gear is None else speed_watches(gear, margin)
         self._bearing = None if gear is None or gear.rated_torque is None else Bearing(gear)

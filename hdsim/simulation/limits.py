@@ -5,18 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.drive.duty import bearing_averages
-from hdsim.drive.ratings import Ratings, bearing_life_h, ratings_of_preset
+from hdsim.drive.duty import averages, bearing_averages
+from hdsim.drive.ratings import Ratings, bearing_life_h
 from hdsim.recording import Event
 from hdsim.simulation.watches import Watch
-
-if TYPE_CHECKING:
-    from hdsim.drive.model import Model
 
 Array = NDArray[np.float64]
 
@@ -26,11 +22,6 @@ _TORQUES = {
     "ratcheting_torque": ("ratcheting torque", ", at which teeth skip in a real drive and never here,"),
     "buckling_torque": ("buckling torque", ", at which the flexspline of a real drive folds and never here,"),
 }
-
-
-def gear_of(model: Model) -> Ratings | None:
-    """What is printed about the limits of a model's drive; None for a drive that is no preset."""
-    return None if model.drive.preset is None else ratings_of_preset(model.drive.preset)
 
 
 def torque_watches(gear: Ratings, margin: float) -> list[Watch]:
@@ -100,10 +91,7 @@ class Bearing:
     @property
     def life_h(self) -> float:
         """Life L10 if the run went on for ever, h; infinite where nothing turns under load."""
-        if self._travel == 0.0 or self._duration == 0.0:
-            return math.inf
-        average_torque = (self._cubed / self._travel) ** (1.0 / 3.0)
-        return bearing_life_h(self.gear, average_torque, self._travel / self._duration * 30.0 / math.pi)
+        return bearing_life_h(self.gear, *averages(self._duration, self._travel, self._cubed))
 
     def told(self, time: float) -> Iterator[Event]:
         """The event of a life below the rated one."""

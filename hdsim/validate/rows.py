@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from hdsim.rows import registrar
+
 
 class Verdict(StrEnum):
     """How a row fares."""
@@ -71,13 +73,4 @@ Check = Callable[[Path | None], Iterable[Row]]
 #: What makes a row, by its name, in the order of the table.
 CHECKS: dict[str, Check] = {}
 
-
-def check(*names: str) -> Callable[[Check], Check]:
-    """Register a function that makes the rows of these names."""
-
-    def register(function: Check) -> Check:
-        for name in names:
-            CHECKS[name] = function
-        return function
-
-    return register
+check = registrar(CHECKS)

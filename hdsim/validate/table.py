@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from fnmatch import fnmatch
 from pathlib import Path
 
 from hdsim.errors import InputError
+from hdsim.rows import chosen, made
 from hdsim.validate import machines, makers, motion
 from hdsim.validate.rows import CHECKS, Row
 
@@ -32,18 +32,7 @@ def compute(
     Raises:
         InputError: a pattern matches nothing, or the folder is none.
     """
-    known, patterns = names(), list(only)
-    for pattern in patterns:
-        if not any(fnmatch(name, pattern) for name in known):
-            raise InputError(f"no row is called {pattern!r}; there are: {', '.join(known)}")
+    wanted = chosen(names(), only, "no row")
     if data is not None and not data.is_dir():
         raise InputError(f"{data}: found no folder, expected the one with the measured records")
-    wanted = [name for name in known if not patterns or any(fnmatch(name, p) for p in patterns)]
-    rows: list[Row] = []
-    for function in dict.fromkeys(CHECKS[name] for name in wanted):
-        for row in function(data):
-            if row.name in wanted:
-                rows.append(row)
-                if on_row is not None:
-                    on_row(row)
-    return sorted(rows, key=lambda row: wanted.index(row.name))
+    return made(CHECKS, wanted, lambda function: function(data), on_row)

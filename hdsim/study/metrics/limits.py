@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.drive.duty import PROCEDURE, bearing_averages
+from hdsim.drive.duty import PROCEDURE, averages, bearing_averages
 from hdsim.drive.ratings import Ratings, bearing_life_h, ratings_of_preset
 from hdsim.errors import InputError
 from hdsim.recording import Recording
@@ -26,8 +26,7 @@ def gear_of(scenario: Scenario) -> Ratings:
     Raises:
         InputError: nothing is printed about the drive.
     """
-    preset = scenario.drive.preset
-    gear = None if preset is None else ratings_of_preset(preset)
+    gear = ratings_of_preset(scenario.drive.preset)
     if gear is None:
         raise InputError("this metric needs the catalogue's limits; the drive is no preset")
     return gear
@@ -37,11 +36,9 @@ def _averages(recording: Recording) -> tuple[float, float]:
     """Cubic mean of the output torque in N m, and mean input speed in rpm; 0 where nothing turns."""
     if len(recording.time) < 2:
         raise InputError("an average needs two samples")
-    duration, travel, cubed = bearing_averages(
-        recording.time, recording["output_torque"], recording["motor_velocity"]
+    return averages(
+        *bearing_averages(recording.time, recording["output_torque"], recording["motor_velocity"])
     )
-    torque = (cubed / travel) ** (1.0 / 3.0) if travel > 0.0 else 0.0
-    return torque, travel / duration * 30.0 / math.pi
 
 
 @metric("average_load_torque", "N m", "cubic mean of the output torque, weighed by the speed", PROCEDURE)
