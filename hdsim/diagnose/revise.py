@@ -7,6 +7,7 @@ without each is fitted anew: a name that leaves nothing which the others do not 
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -47,7 +48,8 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
                 one.needed = needed(bench, rest, current)
                 if len(named) > 2 and one.needed >= NEEDLESS:
                     # Of two names neither can have been needed for the sake of the other alone.
-                    rest = settled(bench, rest)
+                    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+                        rest = settled(bench, rest)
                     one.needed = needed(bench, rest, current)
                 one.worth = bench.power(rest.predictions) - bench.power(current.predictions)
             others.append(rest)
