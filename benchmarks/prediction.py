@@ -22,7 +22,8 @@ from rich.console import Console
 from rich.table import Table
 
 from hdsim.drive.model import Model
-from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor, plan_for
+from hdsim.estimate.plan import plan_for
+from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor
 from hdsim.estimate.records import Record
 from hdsim.scenario import Scenario
 from hdsim.simulation.run import Run

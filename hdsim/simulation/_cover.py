@@ -6,6 +6,7 @@ from math import isfinite
 from typing import Any
 
 from hdsim._compile import compiled
+from hdsim.simulation._beside import follow
 from hdsim.simulation._rosenbrock import (
     DONE,
     FINISHED,
@@ -50,6 +51,10 @@ def cover(  # type: ignore[no-untyped-def]
     out,
     progress,
     blocks,
+    others,
+    near,
+    slopes,
+    beside,
 ):
     """Integrate through the spans between ``cuts``; sample at increasing ``t_eval`` (m,) into ``out`` (m, n).
 
@@ -58,13 +63,18 @@ def cover(  # type: ignore[no-untyped-def]
     to the span before. ``inside_at`` is the place in the reals of a time inside the current span, or -1. The
     state ``guarded`` (-1: none) may not grow beyond ``limit``. ``progress`` (2,) counts spans and samples and
     starts with zeros. After so many ``blocks`` of steps control goes back to Python, which hears of Ctrl-C.
+    Of models beside this one ``others`` (k, reals) holds the reals; ``near`` (k, n), ``slopes`` (k, n) and
+    the samples ``beside`` (k, m, n) are those of ``_beside.follow``.
 
     Returns RUNNING: call again; else what ``advance`` returned, NOT_FINITE_STATE or RUNAWAY.
     """
     for _ in range(blocks):
         span = progress[SPAN]
+        fresh = control[T] == cuts[span]
         if inside_at >= 0:
             reals[inside_at] = 0.5 * (cuts[span] + cuts[span + 1])
+            for k in range(others.shape[0]):
+                others[k, inside_at] = reals[inside_at]
         status = advance(
             address, integers, reals, scratch, stops, y, atol, control, counts, work, times, states, pieces
         )
@@ -75,6 +85,11 @@ def cover(  # type: ignore[no-untyped-def]
         if end > first and counts[DONE] > 0:
             interpolate(times, states, pieces, counts[DONE], t_eval[first:end], out[first:end].T)
             progress[SAMPLED] = end
+        if others.shape[0] > 0 and counts[DONE] > 0:
+            follow(
+                address, integers, reals, others, scratch, times, states, pieces, counts[DONE], fresh,
+                near, slopes, t_eval[first:end], beside[:, first:end],
+            )  # fmt: skip
         if status < 0:
             return status
         for i in range(len(y)):

@@ -5,6 +5,7 @@ The method and its sources are in ``hdsim.simulation._rosenbrock``; when to use 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,19 @@ _CAUSES = {
 _NAMES_SUSPECT = (compiled.STEP_TOO_SMALL, compiled.NOT_FINITE)
 #: Blocks of steps that are taken between two looks at Ctrl-C: about a tenth of a second.
 _BLOCKS = 500
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Models that differ a little from the one that is simulated; see ``hdsim.simulation._beside``.
+
+    Attributes:
+        reals: their numbers, shape (k, reals); a run changes those that say where it is.
+        y0: their initial states, shape (k, n).
+    """
+
+    reals: Array
+    y0: Array
 
 
 class _Block:
@@ -83,10 +97,16 @@ class _Block:
         )
 
     def cover(
-        self, cuts: Array, inside_at: int, guard: Guard | None, t_eval: Array
-    ) -> tuple[int, Array, int]:
-        """Integrate through all spans; see ``_cover.cover``. Returns status, samples (m, n), their number."""
+        self, cuts: Array, inside_at: int, guard: Guard | None, t_eval: Array, others: Beside
+    ) -> tuple[int, Array, int, Array]:
+        """Integrate through all spans; see ``_cover.cover``.
+
+        Returns status, samples (m, n), their number, and differences of the others' samples (k, m, n).
+        """
         out = np.full((len(t_eval), len(self.y)), np.nan)
+        near = others.y0 - self.y
+        beside = np.full((len(near), *out.shape), np.nan)
+        slopes = np.zeros_like(near)
         progress = np.zeros(2, dtype=np.int64)
         status = compiled.RUNNING
         while status == compiled.RUNNING:
@@ -106,8 +126,12 @@ class _Block:
                 out,
                 progress,
                 _BLOCKS,
+                others.reals,
+                near,
+                slopes,
+                beside,
             )
-        return int(status), out, int(progress[_cover.SAMPLED])
+        return int(status), out, int(progress[_cover.SAMPLED]), beside
 
 
 class Rodas4(OdeSolver):  # type: ignore[misc]
@@ -244,6 +268,7 @@ def rodas4_through(
     guard: Guard | None = None,
     first_step: float | None = None,
     max_step: float = np.inf,
+    others: Beside | None = None,
 ) -> Integration:
     """Integrate forward through smooth spans in one compiled loop, without SciPy's.
 
@@ -262,15 +287,20 @@ def rodas4_through(
         guard: gives the run up.
         first_step: size of the first step; chosen when None.
         max_step: largest step.
+        others: models beside this one, with the same integers and without quadratures.
 
     Returns:
         Samples (n, m) up to where it came, and why it stopped. ``message`` has no hint at the cause.
     """
     t_eval = np.ascontiguousarray(t_eval, dtype=np.float64)
     if system.size == 0:
-        return Integration(t_eval, np.empty((0, len(t_eval))), float(cuts[-1]), y0, None, True, "")
+        nothing = np.zeros((0 if others is None else len(others.y0), len(t_eval), 0))
+        empty = np.empty((0, len(t_eval)))
+        return Integration(t_eval, empty, float(cuts[-1]), y0, None, True, "", beside=nothing)
+    if others is None:
+        others = Beside(np.zeros((0, len(system.reals))), np.zeros((0, system.size)))
     block = _Block(system, float(cuts[0]), y0, float(cuts[1]), rtol, atol, first_step, max_step, 64, stops)
-    status, samples, count = block.cover(cuts, inside_at, guard, t_eval)
+    status, samples, count, beside = block.cover(cuts, inside_at, guard, t_eval, others)
     t = float(block.control[compiled.T])
     error = guard.error() if status == _cover.RUNAWAY and guard is not None else None
     cause = f"RunawayError: {error}." if error is not None else _CAUSES.get(status, "")
@@ -286,4 +316,5 @@ def rodas4_through(
         statistics=Statistics(*block.counts[compiled.NFEV : compiled.REJECTED + 1].tolist()),
         suspect=suspect if suspect >= 0 else None,
         exception=error,
+        beside=beside,
     )

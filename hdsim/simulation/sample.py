@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.drive import _layout as a
+from hdsim.drive import _layout as layout
 from hdsim.recording import Column, Table
 from hdsim.simulation.channels import Observer
 from hdsim.simulation.failures import FASTEST, speed_guard, told
@@ -43,17 +43,45 @@ def sample(model: Model, times: Array, channels: Sequence[str], *, rtol: float =
         InputError: there is no such channel.
         RunFailed: the integration stopped before the end; the message says why.
     """
-    from hdsim.simulation.rosenbrock import rodas4_through
+    return samples_beside(model, (), times, channels, rtol=rtol)[0]
+
+
+def samples_beside(
+    model: Model, others: Sequence[Model], times: Array, channels: Sequence[str], *, rtol: float = 1e-6
+) -> list[dict[str, Array]]:
+    """Run a model, and others that differ so little from it that they may be linearised beside it.
+
+    Costs a fraction of a run for each of the others (``hdsim.simulation._beside``), and their difference from
+    the first is free of what two integrations would differ by.
+
+    Args:
+        model: the drive with its parts.
+        others: models that are ``alike``, but for their numbers.
+        times: see ``sample``.
+        channels: likewise.
+        rtol: likewise.
+
+    Returns:
+        What ``sample`` returns, of the model and of each other one.
+
+    Raises:
+        InputError: there is no such channel.
+        RunFailed: the integration stopped before the end; the message says why.
+    """
+    from hdsim.simulation.rosenbrock import Beside, rodas4_through
 
     times = np.ascontiguousarray(times, dtype=np.float64)
-    observer = Observer(model)
     sensors = {c: s for c, s in model.sensors.items() if c in channels}
     needed = {name for chain in sensors.values() for sensor in chain for name in sensor.needs}
     asked = tuple(dict.fromkeys([*channels, *sorted(needed), "motor_velocity"]))
-    grid = _reaching_back(times, observer.memory) if sensors else times
+    observers = [Observer(one) for one in (model, *others)]
+    grid = _reaching_back(times, max(each.memory for each in observers)) if sensors else times
 
     system, end = model.system, float(times[-1])
     spans = cuts(model.signals, end)
+    beside = None
+    if others:
+        beside = Beside(np.stack([o.system.reals for o in others]), np.stack([o.system.y0 for o in others]))
     found = rodas4_through(
         system,
         spans,
@@ -62,23 +90,52 @@ def sample(model: Model, times: Array, channels: Sequence[str], *, rtol: float =
         rtol=rtol,
         atol=rtol * system.scale,
         stops=stops(model, end),
-        inside_at=a.INSIDE,
+        inside_at=layout.INSIDE,
         guard=speed_guard(model),
+        others=beside,
     )
     if not found.success:
         raise RunFailed(told(model, found))
     # What jumps at a time has jumped already.
     span = np.clip(np.searchsorted(spans, grid, side="right") - 1, 0, len(spans) - 2)
     inside = 0.5 * (spans[span] + spans[span + 1])
-    true = observer.values(asked, grid, found.y.T, inside)
-    if np.max(np.abs(true["motor_velocity"])) > FASTEST:  # where it is prescribed, no state tells
-        raise RunFailed(f"RunawayError: motor velocity exceeds {FASTEST:g} rad/s.")
+    states = [found.y.T]
+    if others:
+        assert found.beside is not None
+        states += [found.y.T + difference for difference in found.beside]
     at = slice(None) if grid is times else np.searchsorted(grid, times)
-    read = {}
-    if sensors:
-        history = Table(grid, {name: Column(values, "") for name, values in true.items()})
-        read = {name: column.values for name, column in observer.sensed(history, times, sensors).items()}
-    return {name: true[name][at] for name in channels} | read
+    every = []
+    for observer, y in zip(observers, states, strict=True):
+        true = observer.values(asked, grid, y, inside)
+        if observer is observers[0] and np.max(np.abs(true["motor_velocity"])) > FASTEST:
+            # Where it is prescribed, no state tells.
+            raise RunFailed(f"RunawayError: motor velocity exceeds {FASTEST:g} rad/s.")
+        read = {}
+        if sensors:
+            own = {c: observer.model.sensors[c] for c in sensors}
+            history = Table(grid, {name: Column(values, "") for name, values in true.items()})
+            read = {name: column.values for name, column in observer.sensed(history, times, own).items()}
+        every.append({name: true[name][at] for name in channels} | read)
+    return every
+
+
+def alike(model: Model, other: Model, end_s: float) -> bool:
+    """Whether a model can be linearised beside another up to a time: the same parts, other numbers.
+
+    A ring in static balance is found by iteration in each right-hand side, and what that leaves is no
+    difference of two models.
+    """
+    one, two = model.system, other.system
+    pairs = zip(model.signals, other.signals, strict=False)
+    return (
+        one.integers[layout.RING] != layout.RING_STATIC
+        and one.quadratures == two.quadratures == 0
+        and np.array_equal(one.integers, two.integers)
+        and len(one.reals) == len(two.reals)
+        and len(one.y0) == len(two.y0)
+        and model.sensors.keys() == other.sensors.keys()
+        and all(a is b or np.array_equal(a.corners(0.0, end_s), b.corners(0.0, end_s)) for a, b in pairs)
+    )
 
 
 def _reaching_back(times: Array, memory_s: float) -> Array:

@@ -121,6 +121,7 @@ class Integration:
     statistics: Statistics = field(default_factory=Statistics)
     suspect: int | None = None
     exception: BaseException | None = None
+    beside: Array | None = None
 
 
 class _Watch:
