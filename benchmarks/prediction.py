@@ -6,7 +6,9 @@ A record of SECONDS (20) at 1 kHz with an encoder's noise is prescribed to a siz
 torques and the output's angle. ``run`` is ``Run(...).record()``: all channels, events, energy audit, SciPy's
 loop. ``predict`` is ``Predictor.predict``, which a diagnosis calls up to a thousand times. Costs are
 processor seconds, the shortest of several; errors the largest relative root-mean-square error of a channel
-against a run at 1e-11. The last columns are wall seconds of sixteen models in one thread and in two.
+against a run at 1e-11. ``sensitivities`` is ``Bench.predict_beside`` with the first ten of the model's own
+numbers, linearised beside it, in units of a prediction: what finite differences need ten of. The last columns
+are wall seconds of sixteen models in one thread and in two.
 """
 
 from __future__ import annotations
@@ -22,9 +24,13 @@ from rich.console import Console
 from rich.table import Table
 
 from hdsim.drive.model import Model
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.numbers import base_freedoms
 from hdsim.estimate.plan import plan_for
 from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor
 from hdsim.estimate.records import Record
+from hdsim.estimate.state import State, state_of
+from hdsim.estimate.vector import NEAR, Vector
 from hdsim.scenario import Scenario
 from hdsim.simulation.run import Run
 
@@ -38,7 +44,7 @@ CASES = {
     "rigid": ("rigid", {}),
     "tabulated": ("tabulated", {}),
 }  # fmt: skip
-MANY = 16
+MANY, NUMBERS = 16, 10
 
 
 def record_of(seconds: float) -> Record:
@@ -54,16 +60,23 @@ def record_of(seconds: float) -> Record:
     )
 
 
-def candidate_of(mesh: str, effects: dict[str, object]) -> Candidate:
+def scenario_of(mesh: str, effects: dict[str, object]) -> Scenario:
     """A model with an arm on its output."""
-    scenario = Scenario.model_validate({
+    return Scenario.model_validate({
         "drive": {"preset": "csg-20-100", "mesh": {"model": mesh}},
         "effects": effects,
         "command": {"motor": {"type": "free"}},
         "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
         "run": {"duration_s": 1.0},
     })  # fmt: skip
-    return Candidate(scenario.drive, scenario.effects.active(), scenario.load)
+
+
+def neighbours(bench: Bench, state: State) -> list[State]:
+    """The model with each of its first numbers moved a little."""
+    frees = tuple(base_freedoms(state, bench.channels))
+    vector = Vector(state, frees, 0)
+    own = [k for k, free in enumerate(frees) if not free.reading][:NUMBERS]
+    return [vector.state(vector.start() + NEAR * (np.arange(len(frees)) == k)) for k in own]
 
 
 def run_of(predictor: Predictor, candidate: Candidate, rtol: float) -> dict[str, np.ndarray]:
@@ -106,7 +119,8 @@ def at_equal_error(costs: list[float], errors: list[float], wanted: float) -> fl
 def row(record: Record, name: str) -> list[str]:
     """A line of the table."""
     mesh, effects = CASES[name]
-    candidate = candidate_of(mesh, effects)
+    scenario = scenario_of(mesh, effects)
+    candidate = Candidate(scenario.drive, scenario.effects.active(), scenario.load)
     predictor = Predictor(record, plan_for(record), candidate.drive.ratio)
     repeats = 1 if mesh == "tabulated" else 5
     exact = run_of(predictor, candidate, 1e-8 if mesh == "tabulated" else 1e-11)
@@ -122,6 +136,11 @@ def row(record: Record, name: str) -> list[str]:
             errors[way].append(max(error(call(), exact), 1e-14))
             costs[way].append(cheapest(call, repeats))
     predictor.rtol = TOLERANCES[1]
+    bench, state = Bench([predictor]), state_of(scenario)
+    others = neighbours(bench, state)
+    _, beside = bench.predict_beside(state, others)
+    own = sum(found is not None for found in beside)
+    slopes = cheapest(partial(bench.predict_beside, state, others), repeats) / costs["predict"][1]
     seconds = []
     for threads in (1, 2):
         began = time.perf_counter()
@@ -138,6 +157,7 @@ def row(record: Record, name: str) -> list[str]:
         f"{wanted:.1e}",
         f"{errors['predict'][1]:.1e}",
         "-" if math.isnan(equal) else f"{equal:.1f}",
+        f"{slopes:.1f} for {own}" if own else "-",
         *(f"{value:.2f}" for value in seconds),
     ]
 
@@ -147,13 +167,13 @@ def main() -> None:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
     record = record_of(seconds)
     table = Table(title=f"{seconds:g} s at 1 kHz, processor ms at a tolerance of 1e-6")
-    titles = ("run", "predict", "ratio", "error run", "predict", "ratio at equal error")
+    titles = ("run", "predict", "ratio", "error run", "predict", "ratio at equal error", "sensitivities")
     table.add_column("model")
     for title in (*titles, f"{MANY} in one thread, s", "in two, s"):
         table.add_column(title, justify="right")
     for name in CASES:
         table.add_row(*row(record, name))
-    Console(width=150).print(table)
+    Console(width=170).print(table)
 
 
 if __name__ == "__main__":
