@@ -125,11 +125,6 @@ class LiveReplay:
         self.server.advertise()
         self.player.start()
 
-    def serve(self) -> None:
-        """Serve until interrupted."""
-        while True:
-            _sleep()
-
     def close(self) -> None:
         """Stop serving."""
         self.player.stop()

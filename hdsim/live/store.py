@@ -32,8 +32,8 @@ _HEAD = array("q").itemsize
 class Topic:
     """One topic: how it is encoded, and where its messages are, by the blocks in which they came.
 
-    In the file a block is the times of its messages, then where each body ends, then the bodies. In memory stay
-    three numbers a block, however many messages it has.
+    In the file a block is the times of its messages, then where each body ends, then the bodies. In memory
+    stay three numbers a block, however many messages it has.
     """
 
     schema: records.Schema
