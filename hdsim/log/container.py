@@ -27,7 +27,9 @@ MAGIC = b"\x89MCAP0\r\n"
 CHUNK_SIZE = 1 << 20
 """Bytes of messages in a chunk before compression; what other MCAP writers choose too."""
 
-_ZSTD_LEVEL = 1
+_ZSTD = zstandard.ZstdCompressionParameters.from_level(4, source_size=CHUNK_SIZE, min_match=4)
+"""A row of doubles repeats its tags and the leading bytes of its numbers: short matches. Level 1, which finds
+none below seven bytes, makes a log a third larger in a third of the time."""
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 
@@ -99,7 +101,9 @@ class Container:
         self.watch: Watch | None = None
         self._position = 0
         self._crc = 0
-        self._compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL) if compression == "zstd" else None
+        self._compressor: zstandard.ZstdCompressor | None = None
+        if compression == "zstd":
+            self._compressor = zstandard.ZstdCompressor(compression_params=_ZSTD)
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
         self._chunk_indexes: list[bytes] = []
