@@ -138,4 +138,5 @@ def corners(x: Array, y: Array, every: int) -> NDArray[np.intp]:
         distance = ((offset - np.nan_to_num(share) * np.nan_to_num(chord)) ** 2).sum(0)
     # Any point is better than none.
     distance = np.where(np.isfinite(points[:, groups]).all(0), np.nan_to_num(distance), -1.0)
-    return groups[np.arange(len(starts)), np.argmax(distance, axis=1)]
+    chosen: NDArray[np.intp] = groups[np.arange(len(starts)), np.argmax(distance, axis=1)]
+    return chosen

@@ -188,7 +188,8 @@ class LoopStream:
         every = -(-size // LOOP_POINTS)
         # Groups begin at multiples in the run, so that the same points are chosen from message to message.
         skipped = (size - self._count) % every
-        chosen = skipped + corners(*self._recent[:, skipped:], every)
+        across, up = self._recent[:, skipped:]
+        chosen = skipped + corners(across, up, every)
         begin = max(0, begin - (self._count - size))
         stretch = (chosen >= begin) & (chosen <= begin + LOOP_EVERY)
         rows = np.full((len(self._places) + 1, 1, LOOP_POINTS), np.nan)
