@@ -193,13 +193,13 @@ def read_log(path: str | Path, store: MessageStore) -> tuple[int, int]:
         for content in chunks():
             for run in scan.runs(content):
                 if run.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    register(content, run.span)
+                    register(run.data, run.span)
                 elif run.opcode == Opcode.MESSAGE:
-                    heads = scan.message_heads(content, run)
+                    heads = scan.message_heads(run)
                     channel = channels[int(heads["channel"][0])]
                     times = [int(t) for t in heads["log_time"]]
                     ends += [times[0], times[-1]]
-                    bodies = [bytes(body) for body in scan.message_bodies(content, run)]
+                    bodies = [bytes(body) for body in scan.message_bodies(run)]
                     store.add(schemas[channel.schema_id], channel, times, bodies)
     except (scan.DamageError, KeyError) as error:
         raise InputError(f"{path} is damaged: {error}; try `hdsim recover {path}`") from None
