@@ -185,8 +185,8 @@ def _survey(file: scan.Buffer) -> _Found:
                 last = span
             case Opcode.MESSAGE_INDEX:
                 assert last is not None
-                index = scan.parse(records.MessageIndex, file, span)
-                chunks.setdefault(index.channel_id, []).append(last)
+                channel_id = int.from_bytes(file[span.body][:2], "little")
+                chunks.setdefault(channel_id, []).append(last)
             case Opcode.SCHEMA:
                 schema = scan.parse(records.Schema, file, span)
                 found.schemas[schema.id] = schema

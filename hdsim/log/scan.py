@@ -29,6 +29,7 @@ Buffer = memoryview
 _RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _LARGEST_CHUNK = 1 << 32
+_FEW = 16
 
 
 class DamageError(Exception):
@@ -285,7 +286,12 @@ def _gather(data: bytes, pieces: list[tuple[int, int, int]]) -> Iterator[Run]:
 
 def _equal_heads(data: bytes, at: int, size: int) -> int:
     head = data[at : at + SHARED_HEAD]
-    count, look = 1, 8
+    count, look = 1, _FEW
+    # A few one by one: where topics share a chunk, most runs are short.
+    while count < _FEW:
+        if not data.startswith(head, at + count * size) or at + (count + 1) * size > len(data):
+            return count
+        count += 1
     while (left := (len(data) - at) // size - count) > 0:
         if data[at + count * size : at + count * size + SHARED_HEAD] != head:
             break
