@@ -14,7 +14,7 @@ from hdsim.errors import InputError
 from hdsim.live.web import LOOPBACK, File, Server, host_of
 from hdsim.log import scan
 from hdsim.log.info import LogInfo, info_log
-from hdsim.log.layout import layouts_of_log, playback_speed, to_json
+from hdsim.log.layout import layouts_of_log, to_json
 from hdsim.log.reader import read_attachments
 
 DEFAULT_PORT = 8766
@@ -59,7 +59,7 @@ class FileServer:
         layout_address: where that one is; None for a log that has none.
         takes_layout: whether the viewer opens a layout that its address names. Foxglove opens only those that
             it keeps itself (https://docs.foxglove.dev/docs/visualization/shareable-links).
-        speed: playback speed of the layout to open, or one that suits the run.
+        speed: playback speed of the layout to open; 1 without one.
         about: the log.
 
     Raises:
@@ -100,7 +100,7 @@ class FileServer:
         self.layouts = sorted(layouts, key=lambda name: name != chosen)
         self.layout_address = None if chosen is None else self._address(f"layout-{chosen}.json")
         self.takes_layout = host_of(self.viewer) != host_of(VIEWERS["foxglove"])
-        self.speed = playback_speed(self.about.duration) if speed is None else speed
+        self.speed = 1.0 if speed is None else speed
         if speed is None and chosen is not None:
             self.speed = float(json.loads(layouts[chosen]).get("playbackConfig", {}).get("speed", self.speed))
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True)
