@@ -134,9 +134,10 @@ def order_log(draft: Path, path: Path, compression: Literal["zstd", "none"]) -> 
             _write_ordered(draft, out, compression)
         os.replace(ordered, path)
     except OSError as error:
-        ordered.unlink(missing_ok=True)
         hint = f"{draft} holds everything, try `hdsim recover {draft}`"
         raise InputError(f"{path} cannot be written: {error.strerror}; {hint}") from None
+    finally:
+        ordered.unlink(missing_ok=True)
     draft.unlink()
 
 
