@@ -47,8 +47,8 @@ def wide(rows: int, rate: float, columns: int) -> Table:
 
 
 def test_tables_written_one_after_the_other_lie_in_the_order_of_time(tmp_path):
-    tables = {"state": wide(30_000, 1000.0, 30), "slow": wide(300, 10.0, 40), "fast": wide(9000, 2000.0, 5)}
-    events = [Event(0.05 * k, "info", "x", "tick" * (k % 7)) for k in range(500)]
+    tables = {"state": wide(6000, 1000.0, 40), "slow": wide(60, 10.0, 40), "fast": wide(9000, 2000.0, 5)}
+    events = [Event(0.05 * k, "info", "x", "tick" * (k % 7)) for k in range(100)]
     path = write_log(Recording(tables, events=events, metadata={"scenario": "a: 1"}), tmp_path / "a.mcap")
     assert disorder(path) == []
     assert len(chunks(path)) >= 4
