@@ -38,7 +38,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),
-    "replay": ("hdsim.live.commands:replay", "Serve a finished log to a live viewer."),
+    "replay": ("hdsim.live.commands:replay", "Serve a finished log and its layouts to a viewer."),
     "info": ("hdsim.log.commands:info", "Show what is in a log."),
     "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),

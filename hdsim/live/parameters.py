@@ -32,21 +32,22 @@ class LiveParameters:
         self._scenario = scenario
         self._lock = threading.Lock()
         self._waiting: dict[str, float] = {}
-        self.refused: str | None = None
+        self._refused: list[str] = []
+        self._ended: float | None = None
         self.values = {name: value_of(scenario, name) for name in scenario.live.parameters}
 
     def request(self, name: str, value: float) -> None:
         """Ask for a change.
 
         Raises:
-            InputError: the scenario doesn't mark the number, or doesn't allow the value.
+            InputError: the scenario doesn't mark the number, or doesn't allow the value, or the run is over.
         """
         if name not in self.values:
             marked = ", ".join(self.values) or "none"
             raise InputError(f"{name} may not be changed while it runs; the scenario marks: {marked}")
-        if not np.isfinite(value):
-            raise InputError(f"{name}: {value} is no number")
         with self._lock:
+            if self._ended is not None:
+                raise InputError(self._too_late(name, value))
             with_all = {**self.values, **self._waiting, name: value}
             changed(self._scenario, with_all)
             self._waiting[name] = value
@@ -60,13 +61,38 @@ class LiveParameters:
             return None
         return lambda: self._apply(run, waiting, now)
 
+    def end(self, reached: float) -> None:
+        """Say that the run is over: changes that still wait are refused, as are all that come later.
+
+        Args:
+            reached: simulated time that was reached, s.
+        """
+        with self._lock:
+            self._ended = reached
+            self._refused += [self._too_late(name, value) for name, value in self._waiting.items()]
+            self._waiting = {}
+
+    def refusals(self) -> list[str]:
+        """What has been refused since the last call, to be told to viewers."""
+        with self._lock:
+            found, self._refused = self._refused, []
+        return found
+
+    def _too_late(self, name: str, value: float) -> str:
+        return (
+            f"{name}: {value:g} comes too late, the run is simulated to its end at {self._ended:g} s; "
+            f"it stays {self.values[name]:g}"
+        )
+
     def _apply(self, run: Run, waiting: dict[str, float], now: float) -> None:
         try:
             scenario = changed(self._scenario, {**self.values, **waiting})
             exchange(run, scenario)
         except HdsimError as error:
-            self.refused = str(error).splitlines()[0]
-            run.events.append(Event(now, "warning", "live", f"change refused: {self.refused}"))
+            reason = str(error).splitlines()[0]
+            run.events.append(Event(now, "warning", "live", f"change refused: {reason}"))
+            with self._lock:
+                self._refused.append(reason)
             return
         for name, value in waiting.items():
             run.events.append(Event(now, "info", "live", f"{name}: {self.values[name]:g} -> {value:g}"))

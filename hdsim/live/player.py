@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,6 +16,9 @@ TICK_S = 1 / 60
 LEAD_S = 0.1
 """How far the simulation may be ahead of what is seen, s of the wall clock."""
 
+PATIENCE_S = 0.5
+"""How long playback waits for the simulation before it says so, s of the wall clock: blocks come unevenly."""
+
 SLOWEST, FASTEST = 1e-4, 1e4
 
 _ONLY_LATEST = ("/hd/scene", "/hd/transforms")
@@ -24,11 +28,14 @@ _ONLY_LATEST = ("/hd/scene", "/hd/transforms")
 class Viewer(Protocol):
     """Where the player delivers."""
 
+    def wants(self, topic: str) -> bool:
+        """Whether anybody would get messages of a topic."""
+
     def publish(self, topic: str, log_time: int, body: bytes) -> None:
         """Send one message; must not wait for anybody."""
 
     def tell(self, state: Playback) -> None:
-        """Say where playback is; called after each change and a few times a second."""
+        """Say where playback is; called after each delivery."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +46,7 @@ class Playback:
         time: ns since 1970.
         speed: simulated seconds in a second.
         paused: whether it stands still.
-        waiting: whether it has shown all that is computed, and more is to come.
+        waiting: whether it has been waiting for what is not computed yet.
         ended: whether it is at the end.
         jumped: whether it has just been moved by a seek.
     """
@@ -74,6 +81,7 @@ class Player(threading.Thread):
         self._speed = speed
         self._paused = self._stopped = False
         self._jumped = True
+        self._moved_at = time.monotonic()
         self._stale: set[str] = set()
         self._seen: dict[str, int] = {}
         self.viewer: Viewer | None = None
@@ -144,8 +152,7 @@ class Player(threading.Thread):
 
     def run(self) -> None:
         """Deliver until stopped."""
-        last = told = time.monotonic()
-        before: Playback | None = None
+        last = time.monotonic()
         while True:
             with self._change:
                 if self._stopped:
@@ -158,6 +165,8 @@ class Player(threading.Thread):
                 if not self._paused and not jumped:
                     step = round((now - last) * self._speed * 1e9)
                     self._position = max(since, min(since + step, self._computed))
+                if self._position != since or self._paused or jumped:
+                    self._moved_at = now
                 upto = self._position
                 state = self._state(jumped)
                 self._change.notify_all()
@@ -173,24 +182,18 @@ class Player(threading.Thread):
                 self.viewer.tell(state)
                 continue
             again = [m for m in self._store.latest(since) if m[1] in stale] if stale else []
-            for at, topic, body in [*again, *self._messages(upto)]:
+            for at, topic, body in [*again, *self._messages(upto, self.viewer.wants)]:
                 self.viewer.publish(topic, at, body)
-            moved = before is None or (state.speed, state.paused, state.ended) != (
-                before.speed,
-                before.paused,
-                before.ended,
-            )
-            if moved or now - told > 0.2 or upto != since:
-                self.viewer.tell(state)
-                told, before = now, state
+            self.viewer.tell(state)
 
-    def _messages(self, upto: int) -> list[tuple[int, str, bytes]]:
-        found = self._store.following(self._seen, upto)
+    def _messages(self, upto: int, wanted: Callable[[str], bool]) -> list[tuple[int, str, bytes]]:
+        found = self._store.following(self._seen, upto, wanted)
         last = {topic: k for k, (_, topic, _) in enumerate(found) if topic in _ONLY_LATEST}
         return [m for k, m in enumerate(found) if last.get(m[1], k) == k]
 
     def _state(self, jumped: bool) -> Playback:
         ended = self._position >= self.end_time
-        waiting = self._position >= self._computed and not ended
+        still = time.monotonic() - self._moved_at > PATIENCE_S
+        waiting = still and self._position >= self._computed and not ended
         position = max(self._position, self.start_time)
         return Playback(position, self._speed, self._paused, waiting, ended, jumped)

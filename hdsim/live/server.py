@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from hdsim.errors import HdsimError, InputError
@@ -15,6 +18,9 @@ if TYPE_CHECKING:
 
 DEFAULT_PORT = 8765
 _HINT = "live viewing needs the package foxglove-sdk: pip install 'hdsim[live]'"
+
+HEARTBEAT_S = 0.2
+"""Time between two messages of a time that stands still, s of the wall clock."""
 
 CONTROLS = ("paused", "speed", "seek_s")
 """Parameters for viewers without playback controls: stop, multiple of real time, run time to go to (s)."""
@@ -62,6 +68,9 @@ class LiveServer:
         self._viewers: dict[int, set[int]] = {}
         self._lock = threading.Lock()
         self._told: tuple[Any, ...] = ()
+        self._shown: tuple[Any, ...] = ()
+        self._fresh = False
+        self._time_told = (0, 0.0)
         try:
             self._server = foxglove.start_server(
                 name=name,
@@ -98,6 +107,10 @@ class LiveServer:
         for topic in self._store.topics:
             self._channel(topic)
 
+    def wants(self, topic: str) -> bool:
+        """Whether anybody is subscribed; the topic is offered if it was not yet."""
+        return bool(self._channel(topic).has_sinks())
+
     def publish(self, topic: str, log_time: int, body: bytes) -> None:
         """Send a message to whoever is subscribed."""
         self._channel(topic).log(body, log_time=log_time)
@@ -118,27 +131,42 @@ class LiveServer:
         return channel
 
     def tell(self, state: Playback) -> None:
-        """Publish time, playback state, and parameters where they have changed."""
-        self._server.broadcast_time(state.time)
-        self._server.broadcast_playback_state(self._playback(state, None))
-        shown = (state.paused, state.speed, *(self._parameters.values.values() if self._parameters else ()))
-        if shown != self._told:
-            self._told = shown
-            self._server.publish_parameter_values(self._all_parameters())
-        if self._parameters is not None and self._parameters.refused is not None:
-            self._say(self._parameters.refused)
-            self._parameters.refused = None
+        """Publish time; playback state and parameters where they have changed, or for a new viewer.
 
-    def _playback(self, state: Playback, request: str | None) -> Any:
-        from foxglove.websocket import PlaybackState, PlaybackStatus
+        The protocol wants the state after a change or a request only, and viewers that do not know it
+        complain about each.
+        """
+        now = time.monotonic()
+        if state.time != self._time_told[0] or state.jumped or now - self._time_told[1] > HEARTBEAT_S:
+            self._server.broadcast_time(state.time)
+            self._time_told = state.time, now
+        with self._lock:
+            fresh, self._fresh = self._fresh, False
+        shown = (self._status(state), state.speed)
+        if fresh or state.jumped or shown != self._shown:
+            self._shown = shown
+            self._server.broadcast_playback_state(self._playback(state, None))
+        values = (state.paused, state.speed, *(self._parameters.values.values() if self._parameters else ()))
+        refused = self._parameters.refusals() if self._parameters is not None else []
+        if values != self._told or refused:
+            self._told = values
+            self._server.publish_parameter_values(self._all_parameters())
+        for text in refused:
+            self._say(text)
+
+    def _status(self, state: Playback) -> Any:
+        from foxglove.websocket import PlaybackStatus
 
         if state.ended:
-            status = PlaybackStatus.Ended
-        elif state.paused:
-            status = PlaybackStatus.Paused
-        else:
-            status = PlaybackStatus.Buffering if state.waiting else PlaybackStatus.Playing
-        return PlaybackState(status, state.time, state.speed, state.jumped or bool(request), request or "")
+            return PlaybackStatus.Ended
+        if state.paused:
+            return PlaybackStatus.Paused
+        return PlaybackStatus.Buffering if state.waiting else PlaybackStatus.Playing
+
+    def _playback(self, state: Playback, request: str | None) -> Any:
+        from foxglove.websocket import PlaybackState
+
+        return PlaybackState(self._status(state), state.time, state.speed, state.jumped, request or "")
 
     def _say(self, text: str) -> None:
         self._server.publish_status(text, self._foxglove.StatusLevel.Warning)
@@ -159,6 +187,7 @@ class LiveServer:
     def on_subscribe(self, client: Any, channel: Any) -> None:
         """A viewer wants a topic: it gets the latest message at once."""
         with self._lock:
+            self._fresh = self._fresh or client.id not in self._viewers
             self._viewers.setdefault(client.id, set()).add(channel.id)
             waited, self._waits = self._waits, False
         if waited:
@@ -185,28 +214,29 @@ class LiveServer:
     def on_set_parameters(
         self, client: Any, parameters: list[Any], request_id: str | None = None
     ) -> list[Any]:
-        """Take over what a viewer has set; what cannot be is told to it."""
+        """Take over what a viewer has set; what cannot be is told to it, with the values that hold."""
         for parameter in parameters:
             try:
                 self._set(parameter.name, parameter.get_value())
-            except (HdsimError, TypeError, ValueError) as error:
+            except HdsimError as error:
                 self._say(str(error).splitlines()[0])
-        answer = {p.name: p for p in self._all_parameters()}
-        return list(answer.values())
+        return self._all_parameters()
 
     def _set(self, name: str, value: Any) -> None:
         if name == "paused":
-            self._player.pause(bool(value))
+            if not isinstance(value, bool):
+                raise InputError(f"paused: found {value!r}, expected true or false")
+            self._player.pause(value)
         elif name == "speed":
-            if not float(value) > 0:
+            if not _number(name, value) > 0:
                 raise InputError(f"speed: found {value}, expected a number greater than 0")
             self._player.set_speed(float(value))
         elif name == "seek_s":
-            self._player.seek(naming.EPOCH_NS + round(1e9 * float(value)))
+            self._player.seek(naming.EPOCH_NS + round(1e9 * _number(name, value)))
         elif self._parameters is None:
             raise InputError(f"{name} cannot be changed; there are: {', '.join(CONTROLS)}")
         else:
-            self._parameters.request(name, float(value))
+            self._parameters.request(name, _number(name, value))
 
     def on_parameters_subscribe(self, param_names: list[str]) -> None:
         """Nothing to do: the SDK keeps the list."""
@@ -224,4 +254,11 @@ class LiveServer:
         if request.seek_time is not None:
             self._player.seek(request.seek_time)
         self._player.pause(request.playback_command == PlaybackCommand.Pause)
-        return self._playback(self._player.state, request.request_id)
+        state = replace(self._player.state, jumped=request.seek_time is not None)
+        return self._playback(state, request.request_id)
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{name}: found {value!r}, expected a number")
+    return float(value)

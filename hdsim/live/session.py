@@ -41,7 +41,8 @@ class LiveRun:
     ) -> None:
         self.speed = min(max(speed, SLOWEST), FASTEST)
         self._store = MessageStore()
-        end = naming.EPOCH_NS + round(1e9 * scenario.run.duration_s)
+        self._duration = scenario.run.duration_s
+        end = naming.EPOCH_NS + round(1e9 * self._duration)
         self.player = Player(
             self._store, naming.EPOCH_NS, end, speed=self.speed, computed=naming.EPOCH_NS - 1
         )
@@ -76,6 +77,8 @@ class LiveRun:
 
     def computed(self, time: float) -> None:
         """The log is complete up to a run time, s."""
+        if time >= self._duration:
+            self.parameters.end(time)
         self.player.advance(naming.EPOCH_NS + math.floor(1e9 * time))
 
     def _before_span(self, start: float) -> Callable[[], object] | None:
@@ -121,11 +124,6 @@ class LiveReplay:
         self.address = self.server.address
         self.server.advertise()
         self.player.start()
-
-    def serve(self) -> None:
-        """Serve until interrupted."""
-        while True:
-            _sleep()
 
     def close(self) -> None:
         """Stop serving."""

@@ -205,9 +205,9 @@ class _Check:
         times: list[int] = []
         for run in scan.runs(chunk.data):
             if run.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._register(chunk.data, run.span)
+                self._register(run.data, run.span)
             elif run.opcode == Opcode.MESSAGE:
-                times += self._take_messages(chunk.data, run)
+                times += self._take_messages(run)
         if (chunk.start_time, chunk.end_time) != (min(times, default=0), max(times, default=0)):
             self.problem(f"the chunk at byte {span.start} states other times than its messages have")
         self._chunk_indexes.append(
@@ -224,13 +224,12 @@ class _Check:
             )
         )
 
-    def _take_messages(self, data: bytes, run: scan.Run) -> list[int]:
-        heads = scan.message_heads(data, run)
+    def _take_messages(self, run: scan.Run) -> list[int]:
+        heads = scan.message_heads(run)
         log_times = heads["log_time"].astype(np.int64)
         ends = [int(log_times.min()), int(log_times.max())]
         id = int(heads["channel"][0])
-        offsets = range(run.start, run.start + run.count * run.size, run.size)
-        self._expected.setdefault(id, []).extend(zip(log_times.tolist(), offsets, strict=True))
+        self._expected.setdefault(id, []).extend(zip(log_times.tolist(), run.offsets.tolist(), strict=True))
         self._counts[id] += run.count
         channel = self._channels.get(id)
         if channel is None:
@@ -250,7 +249,7 @@ class _Check:
         topic.first_ns = topic.first_ns if topic.first_ns is not None else int(log_times[0])
         topic.last_ns = int(log_times[-1])
         check = self._checks.get(id)
-        wrong = check.take(data, run) if check else None
+        wrong = check.take(run) if check else None
         if wrong:
             self.problem(f"topic {channel.topic}: {wrong}")
         return ends

@@ -76,7 +76,7 @@ def info(log: Path, columns: bool) -> None:
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--table", default="state", show_default=True, help="Table to write.")
 def export(log: Path, out: Path, table: str) -> None:
-    """Write a table of LOG to OUT, a .csv or .parquet file."""
+    """Write a table of LOG to OUT, a .csv or .parquet file, or its joint states as a ROS 2 bag, an .mcap."""
     from hdsim.log.export import export_log
 
     click.echo(export_log(log, out, table))

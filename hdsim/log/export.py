@@ -1,4 +1,4 @@
-"""Tables of a log for other programs: CSV and Parquet."""
+"""Tables of a log for other programs: CSV and Parquet; its joint states as a bag for ROS 2."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hdsim.log.reader import open_log
 if TYPE_CHECKING:
     from hdsim.recording import Table
 
-_FORMATS = (".csv", ".parquet")
+_FORMATS = (".csv", ".parquet", ".mcap")
 _ROWS_AT_ONCE = 10_000
 
 
@@ -26,10 +26,11 @@ def export_log(path: str | Path, out: str | Path, table: str = "state") -> Path:
     CSV: one header line with units, ``motor_angle [rad]``; numbers with as many digits as bring back the
     same double; columns of arrays as ``normal_force[0] [N]``, ``normal_force[1] [N]``, ...
     Parquet: the same columns, arrays as lists, units and descriptions in each field's metadata.
+    MCAP: no table but the joint states, as a bag that programs of ROS 2 read.
 
     Args:
         path: a log.
-        out: file to write, ``.csv`` or ``.parquet``.
+        out: file to write, ``.csv``, ``.parquet`` or ``.mcap``.
         table: name of the table.
 
     Returns:
@@ -41,22 +42,33 @@ def export_log(path: str | Path, out: str | Path, table: str = "state") -> Path:
     out = Path(out)
     if out.suffix not in _FORMATS:
         raise InputError(f"{out} has the ending {out.suffix!r}; allowed: {', '.join(_FORMATS)}")
-    recording = open_log(path)
-    try:
+    if out.suffix == ".mcap":
+        from hdsim.log.ros_bag import write_bag
+
+        if table != "state":
+            raise InputError(f"--table: found {table}; an .mcap holds the joint states only")
+        if out.exists() and Path(path).exists() and out.samefile(path):
+            raise InputError(f"{out} is the log itself; a bag needs another name")
+    else:
+        recording = open_log(path)
+        if table not in recording.tables:
+            names = ", ".join(recording.tables) or "none"
+            raise InputError(f"{path} has no table {table!r}; there are: {names}")
         chosen = recording.tables[table]
-    except KeyError:
-        names = ", ".join(recording.tables) or "none"
-        raise InputError(f"{path} has no table {table!r}; there are: {names}") from None
     partial = out.with_name(out.name + ".partial")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        if out.suffix == ".csv":
+        if out.suffix == ".mcap":
+            write_bag(Path(path), partial)
+        elif out.suffix == ".csv":
             _write_csv(chosen, partial)
         else:
             _write_parquet(chosen, partial)
         os.replace(partial, out)
     except OSError as error:
         raise InputError(f"{out} cannot be written: {error.strerror}") from None
+    finally:
+        partial.unlink(missing_ok=True)
     return out
 
 

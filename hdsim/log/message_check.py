@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,18 +36,18 @@ class MessageCheck:
         elif not self._json:
             self.reason = f"topic {channel.topic}: encoding {channel.message_encoding!r} is not checked here"
 
-    def take(self, data: bytes, run: scan.Run) -> str | None:
+    def take(self, run: scan.Run) -> str | None:
         """Check a run of messages; returns what is wrong."""
         if self._fields is not None:
-            first = memoryview(data)[run.start + HEAD.size : run.start + run.size]
+            first = memoryview(run.data)[run.start + HEAD.size : run.start + run.size]
             layout = RowLayout.of_message(self._fields, first)
-            whole = np.frombuffer(data, np.uint8, run.count * run.size, run.start)
+            whole = np.frombuffer(run.data, np.uint8, run.count * run.size, run.start)
             # All tags and lengths are right, and all else is doubles: nothing is left that could not parse.
             if layout is not None and layout.matches(whole.reshape(run.count, run.size)):
-                run = scan.Run(run.opcode, run.start, run.size, 1)
+                run = replace(run, count=1)
         if self._class is None and not self._json and not self._joints:
             return None
-        for index, body in enumerate(scan.message_bodies(data, run)):
+        for index, body in enumerate(scan.message_bodies(run)):
             try:
                 if self._joints:
                     wrong = joint_states.problem_of(bytes(body))

@@ -89,27 +89,27 @@ class TopicReader:
         self._layout: RowLayout | None = None
         self._blocks: list[list[Array]] = []
 
-    def take(self, data: bytes, run: scan.Run) -> None:
+    def take(self, run: scan.Run) -> None:
         """Decode a run of messages: at once where the bytes are laid out as hdsim does, else singly."""
         layout = self._layout
         if layout is None or layout.size != run.size:
-            body = memoryview(data)[run.start + HEAD.size : run.start + run.size]
+            body = memoryview(run.data)[run.start + HEAD.size : run.start + run.size]
             layout = RowLayout.of_message(self._fields, body)
         if layout is not None:
-            whole = np.frombuffer(data, np.uint8, run.count * run.size, run.start)
+            whole = np.frombuffer(run.data, np.uint8, run.count * run.size, run.start)
             if layout.matches(whole.reshape(run.count, run.size)):
                 self._layout = layout
-                rows = np.frombuffer(data, layout.dtype, run.count, run.start)
+                rows = np.frombuffer(run.data, layout.dtype, run.count, run.start)
                 self._blocks.append([rows[f"f{i}"].astype(np.float64) for i in range(len(self.names))])
                 return
-        self._blocks.append(self._one_by_one(data, run))
+        self._blocks.append(self._one_by_one(run))
 
-    def _one_by_one(self, data: bytes, run: scan.Run) -> list[Array]:
+    def _one_by_one(self, run: scan.Run) -> list[Array]:
         from google.protobuf.message import DecodeError
 
         values: list[list[Any]] = [[] for _ in self.names]
         try:
-            for body in scan.message_bodies(data, run):
+            for body in scan.message_bodies(run):
                 message = self._class.FromString(body)
                 for column, name, field in zip(values, self.names, self._fields, strict=True):
                     value = getattr(message, name)
@@ -147,13 +147,11 @@ class _Contents:
             case Opcode.SCHEMA | Opcode.CHANNEL:
                 self._register(data, span)
             case Opcode.CHUNK:
-                content = scan.open_chunk(data, span).data
-                for run in scan.runs(content):
-                    self._take_run(content, run)
+                for run in scan.runs(scan.open_chunk(data, span).data, self._reads):
+                    self._take_run(run)
             case Opcode.MESSAGE:
-                self._take_run(
-                    bytes(data[span.start : span.end]), scan.Run(span.opcode, 0, span.end - span.start, 1)
-                )
+                record = bytes(data[span.start : span.end])
+                self._take_run(scan.Run(span.opcode, 0, len(record), 1, record))
             case Opcode.DATA_END:
                 scan.check_data_end(data, span)
             case Opcode.FOOTER:
@@ -202,21 +200,24 @@ class _Contents:
             self.tables[name] = (channel.topic, naming.columns_from_json(channel.metadata["columns"]))
         return is_table
 
-    def _take_run(self, content: bytes, run: scan.Run) -> None:
+    def _reads(self, channel: int) -> bool:
+        return channel in self._event_channels or self._topics.get(channel) is not None
+
+    def _take_run(self, run: scan.Run) -> None:
         if run.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             try:
-                self._register(content, run.span)
+                self._register(run.data, run.span)
             except ValueError as error:
                 raise scan.DamageError(str(error)) from None
         elif run.opcode == Opcode.MESSAGE:
-            channel = int(scan.message_heads(content, run)["channel"][0])
+            channel = int(scan.message_heads(run)["channel"][0])
             if channel in self._event_channels:
-                self._take_events(self._event_channels[channel], content, run)
+                self._take_events(self._event_channels[channel], run)
             elif (topic := self._topics.get(channel)) is not None:
-                topic.take(content, run)
+                topic.take(run)
 
-    def _take_events(self, kind: Any, content: bytes, run: scan.Run) -> None:
-        for body in scan.message_bodies(content, run):
+    def _take_events(self, kind: Any, run: scan.Run) -> None:
+        for body in scan.message_bodies(run):
             log = kind.FromString(body)
             stamp = log.timestamp.seconds * 1_000_000_000 + log.timestamp.nanos - naming.EPOCH_NS
             time = float(log.time) if hasattr(log, "time") else stamp / 1e9

@@ -6,7 +6,6 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 from mcap import records
 from mcap.opcode import Opcode
 
@@ -157,18 +156,17 @@ class _Rescue:
         counts: dict[str, int] = {}
         for run in scan.runs(chunk.data):
             if run.opcode == Opcode.SCHEMA:
-                self._register(chunk.data, run.span)
+                self._register(run.data, run.span)
             elif run.opcode == Opcode.CHANNEL:
-                introduced.add(self._register(chunk.data, run.span))
+                introduced.add(self._register(run.data, run.span))
             elif run.opcode == Opcode.MESSAGE:
-                heads = scan.message_heads(chunk.data, run)
+                heads = scan.message_heads(run)
                 id = int(heads["channel"][0])
                 if id not in self._channels:
                     raise scan.DamageError(
                         f"the chunk at byte {span.start} needs channel {id}, lost with another"
                     )
-                offsets = run.size * np.arange(run.count, dtype=np.int64) + run.start
-                indexes.add(id, heads["log_time"], offsets)
+                indexes.add(id, heads["log_time"], run.offsets)
                 topic = self._channels[id].topic
                 counts[topic] = counts.get(topic, 0) + run.count
         if not indexes.by_channel:

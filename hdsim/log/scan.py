@@ -5,9 +5,10 @@ from __future__ import annotations
 import mmap
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -17,6 +18,7 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
 from hdsim.errors import InputError
 from hdsim.log.container import MAGIC
@@ -27,6 +29,7 @@ Buffer = memoryview
 _RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _LARGEST_CHUNK = 1 << 32
+_FEW = 16
 
 
 class DamageError(Exception):
@@ -201,32 +204,48 @@ def _decompress(compression: str, packed: Buffer, size: int) -> bytes:
 
 @dataclass(frozen=True)
 class Run:
-    """Records that follow each other in a chunk: one of any kind, or messages of one channel and length.
+    """Records of a chunk that are alike: one of any kind, or messages of one channel and length, in order.
 
     Args:
         opcode: of all of them.
-        start: where the first begins in the chunk.
+        start: where the first begins in ``data``; the others follow it at once.
         size: bytes of each.
         count: how many.
+        data: the chunk, or a copy of those of its messages that are of this channel.
+        places: where the messages are in the chunk, shape (count,); None if ``data`` is the chunk.
     """
 
     opcode: int
     start: int
     size: int
     count: int
+    data: bytes
+    places: NDArray[np.int64] | None = None
 
     @property
     def span(self) -> Span:
         """Place of the first."""
         return Span(self.opcode, self.start, self.start + self.size)
 
+    @property
+    def offsets(self) -> NDArray[np.int64]:
+        """Where the records begin in the chunk, shape (count,)."""
+        if self.places is not None:
+            return self.places
+        return self.start + self.size * np.arange(self.count, dtype=np.int64)
 
-def runs(data: bytes) -> Iterator[Run]:
-    """The records of a chunk.
+
+def runs(data: bytes, wanted: Callable[[int], bool] = lambda channel: True) -> Iterator[Run]:
+    """The records of a chunk: first those that are no messages, then the messages channel by channel.
+
+    Args:
+        data: the chunk.
+        wanted: whether messages of a channel are; asked when all else has been handed out.
 
     Raises:
         DamageError: a record leaves the chunk.
     """
+    pieces: dict[bytes, list[tuple[int, int, int]]] = {}
     at = 0
     while at < len(data):
         if at + _RECORD_HEAD.size > len(data):
@@ -235,16 +254,44 @@ def runs(data: bytes) -> Iterator[Run]:
         size = _RECORD_HEAD.size + length
         if at + size > len(data):
             raise DamageError(f"a record leaves its chunk, at byte {at}")
-        if opcode == Opcode.MESSAGE and size < HEAD.size:
+        if opcode != Opcode.MESSAGE:
+            yield Run(opcode, at, size, 1, data)
+            at += size
+            continue
+        if size < HEAD.size:
             raise DamageError(f"a message is too short, at byte {at}")
-        count = _equal_heads(data, at, size) if opcode == Opcode.MESSAGE else 1
-        yield Run(opcode, at, size, count)
+        count = _equal_heads(data, at, size)
+        pieces.setdefault(data[at + _RECORD_HEAD.size : at + SHARED_HEAD], []).append((at, size, count))
         at += size * count
+    for channel, of_channel in pieces.items():
+        if wanted(int.from_bytes(channel, "little")):
+            yield from _gather(data, of_channel)
+
+
+def _gather(data: bytes, pieces: list[tuple[int, int, int]]) -> Iterator[Run]:
+    """Messages of one channel, wherever they lie (start, size, count), one after the other."""
+    if len(pieces) == 1:
+        yield Run(Opcode.MESSAGE, *pieces[0], data)
+        return
+    gathered = b"".join([data[at : at + size * count] for at, size, count in pieces])
+    begin = 0
+    for size, alike in groupby(pieces, key=lambda piece: piece[1]):
+        starts, counts = np.array([(at, count) for at, _, count in alike], np.int64).T
+        total = int(counts.sum())
+        within = np.arange(total) - np.repeat(np.cumsum(counts) - counts, counts)
+        places = np.repeat(starts, counts) + size * within
+        yield Run(Opcode.MESSAGE, begin, size, total, gathered, places)
+        begin += size * total
 
 
 def _equal_heads(data: bytes, at: int, size: int) -> int:
     head = data[at : at + SHARED_HEAD]
-    count, look = 1, 8
+    count, look = 1, _FEW
+    # A few one by one: where topics share a chunk, most runs are short.
+    while count < _FEW:
+        if not data.startswith(head, at + count * size) or at + (count + 1) * size > len(data):
+            return count
+        count += 1
     while (left := (len(data) - at) // size - count) > 0:
         if data[at + count * size : at + count * size + SHARED_HEAD] != head:
             break
@@ -258,7 +305,7 @@ def _equal_heads(data: bytes, at: int, size: int) -> int:
     return count
 
 
-def message_heads(data: bytes, run: Run) -> np.ndarray[Any, np.dtype[Any]]:
+def message_heads(run: Run) -> np.ndarray[Any, np.dtype[Any]]:
     """Heads of a run of messages: structured array (count,) of channel, sequence, log and publish time."""
     dtype = np.dtype(
         [
@@ -271,13 +318,13 @@ def message_heads(data: bytes, run: Run) -> np.ndarray[Any, np.dtype[Any]]:
             ("body", f"V{run.size - HEAD.size}"),
         ]
     )
-    return np.frombuffer(data, dtype, run.count, run.start)
+    return np.frombuffer(run.data, dtype, run.count, run.start)
 
 
-def message_bodies(data: bytes, run: Run) -> Iterator[bytes]:
+def message_bodies(run: Run) -> Iterator[bytes]:
     """Payloads of a run of messages."""
     for start in range(run.start, run.start + run.size * run.count, run.size):
-        yield data[start + HEAD.size : start + run.size]
+        yield run.data[start + HEAD.size : start + run.size]
 
 
 def data_crc(data: Buffer, end: int) -> int:

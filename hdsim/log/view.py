@@ -108,3 +108,35 @@ class MinMaxView:
                 )
             )
         return lay_out(time[starts], time[lasts]), reduced
+
+
+def corners(x: Array, y: Array, every: int) -> NDArray[np.intp]:
+    """Samples that keep the shape of a curve: of each ``every`` in a row the one that stands out most.
+
+    That is the one farthest from the straight piece between the sample before those in the row and the one
+    after them, on axes as long as the curve is wide and high.
+
+    Args:
+        x: (n,), NaN where there is none.
+        y: (n,).
+        every: at least 1.
+
+    Returns:
+        Positions (ceil(n / every),), increasing.
+    """
+    n = len(x)
+    starts = np.arange(0, n, every)
+    if every <= 1:
+        return starts
+    groups = np.minimum(starts[:, None] + np.arange(every), n - 1)
+    with np.errstate(all="ignore"):
+        points = np.stack([v / (np.nanmax(v) - np.nanmin(v)) if np.isfinite(v).any() else v for v in (x, y)])
+        before = points[:, np.maximum(starts - 1, 0), None]
+        chord = points[:, np.minimum(starts + every, n - 1), None] - before
+        offset = points[:, groups] - before
+        share = np.clip((offset * chord).sum(0) / (chord**2).sum(0), 0.0, 1.0)
+        distance = ((offset - np.nan_to_num(share) * np.nan_to_num(chord)) ** 2).sum(0)
+    # Any point is better than none.
+    distance = np.where(np.isfinite(points[:, groups]).all(0), np.nan_to_num(distance), -1.0)
+    chosen: NDArray[np.intp] = groups[np.arange(len(starts)), np.argmax(distance, axis=1)]
+    return chosen

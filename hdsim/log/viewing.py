@@ -10,13 +10,16 @@ import numpy as np
 from hdsim.log import naming
 from hdsim.log.naming import Array, ColumnSpec
 from hdsim.log.streams import TableStream
-from hdsim.log.view import MinMaxView
+from hdsim.log.view import MinMaxView, corners
 
 ARCSEC_PER_RAD = 180 * 3600 / np.pi
 LOOP_COLUMNS = ("twist_arcsec", "output_torque")
 LOOP_NOW = "output_torque_now"
 LOOP_SAMPLES = 2000
-"""Samples of the view in a loop: half of them before its stretch begins, half from there on."""
+"""Samples of the view that a loop covers: half of them before its stretch begins, half from there on."""
+
+LOOP_POINTS = 500
+"""Points of a loop: those among its samples that keep its shape. A panel has no more pixels for them."""
 
 LOOP_EVERY = 100
 """Samples of the view in a stretch: from one loop to the next."""
@@ -108,9 +111,10 @@ class LoopStream:
 
     Viewers draw a curve of one quantity over another only from arrays within a message, and show the last
     message whose time has come. So a message bears the time at which its stretch begins, and holds what lies
-    around: `LOOP_SAMPLES`, at the ends of a run its first or last ones, older ones first, NaN where a run is
-    shorter. It is written when these are known, half its length behind the view. A second array holds the
-    torque of the stretch itself, NaN elsewhere, so that one sees where on the curve the drive is.
+    around: `LOOP_SAMPLES`, at the ends of a run its first or last ones, older ones first, thinned to
+    `LOOP_POINTS`, NaN where a run has fewer. It is written when these are known, half its length behind the
+    view. A second array holds the torque of the stretch itself, NaN elsewhere, so that one sees where on the
+    curve the drive is.
 
     Who watches the run while it is simulated can't see ahead: the watch gets messages of what there is so
     far, at the time of their last sample, with the latest stretch as the second array.
@@ -138,7 +142,7 @@ class LoopStream:
         if not all(name in by_name for name in LOOP_COLUMNS):
             return None
         chosen = [by_name[name] for name in LOOP_COLUMNS]
-        shape = (LOOP_SAMPLES,)
+        shape = (LOOP_POINTS,)
         specs = [ColumnSpec(c.name, c.field, c.unit, c.description, shape) for _, c in chosen]
         specs.append(ColumnSpec(LOOP_NOW, LOOP_NOW, specs[-1].unit, "of the stretch that begins now", shape))
         return cls(make(specs), [i for i, _ in chosen])
@@ -179,11 +183,16 @@ class LoopStream:
             self.stream.show(time, naming.to_ns(time), self._arrays(self._count - 1 - LOOP_EVERY))
 
     def _arrays(self, begin: int) -> list[Array]:
-        """What a message holds: the samples at hand, and the torque of those from ``begin`` on."""
+        """What a message holds: points of the samples at hand, and the torque of those from ``begin`` on."""
         size = self._recent.shape[1]
-        first = max(0, begin - (self._count - size))
-        stretch = slice(first, min(size, first + LOOP_EVERY + 1))
-        rows = np.full((len(self._places) + 1, 1, LOOP_SAMPLES), np.nan)
-        rows[:-1, 0, :size] = self._recent
-        rows[-1, 0, stretch] = self._recent[-1, stretch]
+        every = -(-size // LOOP_POINTS)
+        # Groups begin at multiples in the run, so that the same points are chosen from message to message.
+        skipped = (size - self._count) % every
+        across, up = self._recent[:, skipped:]
+        chosen = skipped + corners(across, up, every)
+        begin = max(0, begin - (self._count - size))
+        stretch = (chosen >= begin) & (chosen <= begin + LOOP_EVERY)
+        rows = np.full((len(self._places) + 1, 1, LOOP_POINTS), np.nan)
+        rows[:-1, 0, : len(chosen)] = self._recent[:, chosen]
+        rows[-1, 0, : len(chosen)] = np.where(stretch, self._recent[-1, chosen], np.nan)
         return list(rows)

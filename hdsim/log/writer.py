@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -15,6 +14,7 @@ from hdsim.log import naming
 from hdsim.log.container import Container, Watch, opened
 from hdsim.log.events import event_message
 from hdsim.log.joint_states import MESSAGE_TYPE, JointStateStream, has_joints
+from hdsim.log.ordering import order_log
 from hdsim.log.streams import MessageStream, TableStream
 from hdsim.log.view import DEFAULT_VIEW_RATE_HZ, MinMaxView
 from hdsim.log.viewing import LoopStream, ViewStream, display_columns, scaled
@@ -25,16 +25,15 @@ if TYPE_CHECKING:
 
     Array = naming.Array
 
-
 _JOINT_TABLES = ("state", "measured")
 
 
 class LogWriter:
     """A log on its way to the disk; a context manager.
 
-    Everything goes to ``<path>.partial``, which takes its name when the log is closed. When the ``with``
-    block ends by an exception, the log is closed too, with a record and an event that say so, and what was
-    computed can be opened. Only a killed process leaves a ``.partial``, for `hdsim.log.recover_log`.
+    Everything goes to ``<path>.partial``, topic by topic; closing it writes the log, in the order of time. So
+    does an exception in the ``with`` block, with a record and an event of it. Only a killed process leaves a
+    ``.partial``, for `hdsim.log.recover_log`.
 
     Metadata and attachments come first in the file, so that they survive whatever happens later.
 
@@ -45,7 +44,7 @@ class LogWriter:
         view_rate_hz: samples a second in the decimated twin of the state; `hdsim.log.view.view_rate` has
             one that suits a run's length. Infinite keeps every sample.
         compression: of the chunks.
-        watch: sees every message as it is written, for who shows the run while it goes on.
+        watch: sees every message as it is written.
         layouts: attach the viewer's layouts that fit the log when it is closed.
 
     Attributes:
@@ -85,7 +84,8 @@ class LogWriter:
         self._schemas: dict[str, int] = {}
         self._last_event_ns = 0
         self._open = True
-        self._container = Container(self._file, compression)
+        self._compression = compression
+        self._container = Container(self._file, compression, draft=True)
         self._container.watch = watch
         self._container.metadata(naming.RUN_RECORD, metadata)
         for name, content in (attachments or {}).items():
@@ -327,9 +327,8 @@ class LogWriter:
     def _finish(self, statistics: Mapping[str, str] | None = None, incomplete: str | None = None) -> None:
         if incomplete is not None:
             ends = [s.last_time for s in self._tables.values() if s.last_time is not None]
-            self.write_event(
-                Event(max(ends, default=0.0), "error", "hdsim.log", f"run incomplete: {incomplete}")
-            )
+            text = f"run incomplete: {incomplete}"
+            self.write_event(Event(max(ends, default=0.0), "error", "hdsim.log", text))
         self._open = False
         try:
             for stream in self._tables.values():
@@ -347,4 +346,4 @@ class LogWriter:
             self._container.finish()
         finally:
             self._file.close()
-        os.replace(self.partial, self.path)
+        order_log(self.partial, self.path, self._compression)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,6 +84,7 @@ def run(
             click.echo(f"picture  {picture}")
         except InputError as error:
             click.echo(f"picture  none: {error}")
+    click.echo(f"replay   hdsim replay {shlex.quote(str(path))}")
     if done.failure:
         click.echo(f"error: the run stopped early: {done.failure}", err=True)
         return 1

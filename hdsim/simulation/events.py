@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from hdsim.drive.ratings import ratings_of_preset
 from hdsim.recording import Event
 from hdsim.simulation.limits import Bearing, speed_watches, torque_watches
-from hdsim.simulation.watches import Flanks, Watch
+from hdsim.simulation.quota import Quota
+from hdsim.simulation.watches import CROSSED, Flanks, Watch
 
 if TYPE_CHECKING:
     from hdsim.drive.model import Model
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Events of one kind that are told singly; the rest are counted.
-MOST = 12
 #: Share of the rated torque below which a flank counts as unloaded.
 UNLOADED = 1e-3
 #: Refused steps in a block below which nothing is said.
@@ -31,19 +30,11 @@ DOUBT = 1e-3
 
 
 @dataclass
-class _Count:
-    told: int = 0
-    untold: int = 0
-    last: float = 0.0
-    level: str = "info"
-
-
-@dataclass
 class EventDetector:
     """Finds the events of a run in the blocks of its tables.
 
-    Of each kind (a source and the words that don't depend on numbers) at most ``MOST`` are told; ``finish``
-    tells how many more there were.
+    Of each kind (a condition's beginning and end, else a source and the words that don't depend on numbers)
+    as many are told as a `Quota` allows.
 
     Args:
         model: the model that runs.
@@ -52,7 +43,7 @@ class EventDetector:
 
     model: Model
     duration: float
-    _counts: dict[tuple[str, str], _Count] = field(default_factory=dict)
+    _quotas: dict[tuple[str, str], Quota] = field(default_factory=dict)
     _reference: tuple[float, float] | None = None
     _moving: bool | None = None
     _steps: int = 0
@@ -115,6 +106,10 @@ class EventDetector:
                 end,
                 0.5 * end,
             )
+        watches = [*self._output, *self._input, self._saturation, self._idle, self._doubt]
+        watches += [watch for watch in (self._share, self._force) if watch is not None]
+        self._begins = {(watch.source, _words(watch.begins)): watch for watch in watches}
+        self._ends = {(watch.source, watch.ends): watch for watch in watches if watch.ends}
 
     def start(self, method: str) -> list[Event]:
         """The event of the beginning."""
@@ -160,7 +155,7 @@ class EventDetector:
         if self._force is not None and "teeth" in tables:
             teeth = tables["teeth"]
             found += self._force.feed(teeth.time, np.abs(teeth["normal_force"]).max(axis=1))
-        return self._limited(sorted(found, key=lambda event: event.time))
+        return self._limited(found, float(time[-1]))
 
     def friction(self, time: float, part: str) -> list[Event]:
         """The event of a friction or damping that gives energy back, once.
@@ -182,13 +177,7 @@ class EventDetector:
             time: time that was reached, s.
             failure: why the run stopped early, or None.
         """
-        found = [
-            Event(
-                time, count.level, source, f"{count.untold} more times: {kind} (last at {count.last:.6g} s)"
-            )
-            for (source, kind), count in self._counts.items()
-            if count.untold
-        ]
+        found = [event for quota in self._quotas.values() for event in quota.finish(time)]
         if self._bearing is not None:
             found += self._bearing.told(time)
         if failure is None:
@@ -223,18 +212,28 @@ class EventDetector:
         self._moving = bool(moves[-1])
         return found
 
-    def _limited(self, events: list[Event]) -> list[Event]:
-        told = []
-        for event in events:
-            kind = " ".join(word for word in event.message.split() if not any(c.isdigit() for c in word))
-            count = self._counts.setdefault((event.source, kind), _Count(level=event.level))
-            count.last = event.time
-            if count.told < MOST:
-                count.told += 1
-                told.append(event)
-            else:
-                count.untold += 1
-        return told
+    def _limited(self, events: list[Event], upto: float) -> list[Event]:
+        """What the quotas tell of a block's events, in the order of time."""
+        by_quota: dict[int, list[Event]] = {}
+        for event in sorted(events, key=lambda event: event.time):
+            by_quota.setdefault(id(self._quota(event)), []).append(event)
+        told = [e for quota in self._quotas.values() for e in quota.feed(by_quota.get(id(quota), []), upto)]
+        return sorted(told, key=lambda event: event.time)
+
+    def _quota(self, event: Event) -> Quota:
+        kind, ends = _words(event.message), ""
+        watch = self._ends.get((event.source, event.message)) or self._begins.get((event.source, kind))
+        if watch is not None:
+            ends = watch.ends
+            kind = _words(watch.begins) if "{" in watch.begins else watch.begins
+        elif kind.startswith(CROSSED):
+            kind = CROSSED
+        return self._quotas.setdefault((event.source, kind), Quota(kind, self.duration, ends))
+
+
+def _words(message: str) -> str:
+    """The words of a message that don't depend on numbers."""
+    return " ".join(word for word in message.split() if not any(c.isdigit() for c in word))
 
 
 def torque_limit(model: Model) -> float:

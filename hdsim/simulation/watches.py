@@ -12,6 +12,9 @@ from hdsim.recording import Event
 
 Array = NDArray[np.float64]
 
+#: How the message of a crossing begins, either way.
+CROSSED = "gap crossed"
+
 
 @dataclass
 class Watch:
@@ -85,7 +88,7 @@ class Flanks:
                     else "from the negative to the positive"
                 )
                 took = 1e3 * (float(time[k]) - left)
-                yield Event(left, "info", "mesh", f"gap crossed {way} flank in {took:.3g} ms")
+                yield Event(left, "info", "mesh", f"{CROSSED} {way} flank in {took:.3g} ms")
             self._side = float(side[k])
         if len(loaded):
             self._left = float(time[loaded[-1]])

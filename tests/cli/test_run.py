@@ -55,6 +55,7 @@ def test_run_writes_a_verified_log_and_a_picture(tmp_path: Path, capsys: pytest.
     assert run(scenario, "-o", tmp_path / "out" / "free.mcap") == 0
     printed = capsys.readouterr()
     assert "verified yes" in printed.out
+    assert "\nreplay   hdsim replay " in printed.out
     assert "energy audit" in printed.out
     assert printed.err == ""
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["free.mcap", "free.png"]

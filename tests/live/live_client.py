@@ -29,6 +29,7 @@ class Client:
         self.playback: list[tuple[int, int, float, bool, str]] = []
         self.status: list[str] = []
         self.clock = 0
+        self.clocks = 0
         self.after_seek: set[str] = set()
         """Topics that have come since time went back."""
 
@@ -68,6 +69,7 @@ class Client:
             self.after_seek.add(self.channels[id]["topic"])
         elif data[0] == 2:
             before = self.clock
+            self.clocks += 1
             (self.clock,) = struct.unpack_from("<Q", data, 1)
             if self.clock < before:
                 self.after_seek = set()

@@ -232,7 +232,6 @@ def test_a_finished_log_is_served_the_same_way(tmp_path):
     try:
         client = Client(live.address)
         assert client.take(10, lambda: len(client.times(VIEW)) > 20)
-        assert "/hd/state" not in client.messages
         assert "/hd/scene_static" in client.messages
         client.set(seek_s=0.9, speed=0.1)
         assert client.take(5, lambda: client.playback[-1][1] >= naming.EPOCH_NS + 900_000_000)

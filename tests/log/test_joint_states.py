@@ -7,8 +7,10 @@ import pytest
 from driving import drive_run
 from mcap.reader import make_reader
 
-from hdsim.log import LogWriter, verify_log, write_log
+from hdsim.errors import InputError
+from hdsim.log import LogWriter, export_log, verify_log, write_log
 from hdsim.log.joint_states import problem_of
+from hdsim.log.naming import to_ns
 from hdsim.recording import Recording, Table
 
 
@@ -50,6 +52,42 @@ def test_rosbags_reads_the_same(tmp_path):
     np.testing.assert_array_equal([m.position[0] for m in messages], run["motor_angle"])
     np.testing.assert_array_equal([m.effort[1] for m in messages], run["output_torque"])
     assert messages[0].header.frame_id == "world"
+
+
+def test_rosbags_reads_them_as_a_bag(tmp_path):
+    pytest.importorskip("rosbags", reason="rosbags is not installed")
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    run = drive_run(duration=2.0)
+    log = write_log(run, tmp_path / "a.mcap")
+    bag = export_log(log, tmp_path / "bag" / "joints.mcap")
+    with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        (connection,) = reader.connections
+        assert (connection.topic, connection.msgtype) == ("/joint_states", "sensor_msgs/msg/JointState")
+        assert len(connection.ext.offered_qos_profiles) == 1
+        found = [(at, reader.deserialize(raw, kind.msgtype)) for kind, at, raw in reader.messages()]
+    assert [at for at, _ in found] == (to_ns(run.time)).tolist()
+    np.testing.assert_array_equal([m.position[0] for _, m in found], run["motor_angle"])
+    np.testing.assert_array_equal([m.velocity[1] for _, m in found], run["output_velocity"])
+    with open(bag, "rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        assert len(list(reader.iter_messages())) == len(run.time)
+
+
+def test_what_is_no_bag_is_told(tmp_path):
+    run = drive_run(duration=0.1)
+    log = write_log(run, tmp_path / "a.mcap")
+    with pytest.raises(InputError, match="is the log itself"):
+        export_log(log, tmp_path / "a.mcap")
+    with pytest.raises(InputError, match="holds the joint states only"):
+        export_log(log, tmp_path / "b.mcap", "teeth")
+    table = Table(run.time, {"load_torque": run.channels["load_torque"]})
+    without = write_log(Recording({"state": table}), tmp_path / "c.mcap")
+    with pytest.raises(InputError, match=r"c\.mcap has no /joint_states"):
+        export_log(without, tmp_path / "d.mcap")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mcap", "c.mcap"]
 
 
 def test_joint_states_are_thinned_to_real_samples_however_the_run_is_cut(tmp_path):

@@ -11,8 +11,8 @@ from hypothesis.extra import numpy as hnp
 from hdsim.log import LogWriter, write_log
 from hdsim.log.naming import EPOCH_NS
 from hdsim.log.schemas import message_class
-from hdsim.log.view import MinMaxView
-from hdsim.log.viewing import LOOP_EVERY, LOOP_SAMPLES
+from hdsim.log.view import MinMaxView, corners
+from hdsim.log.viewing import ARCSEC_PER_RAD, LOOP_EVERY, LOOP_POINTS, LOOP_SAMPLES
 from hdsim.recording import Column, Recording, Table
 
 
@@ -135,12 +135,12 @@ def test_the_first_loop_message_holds_a_curve_already(tmp_path):
     at, first = loop_messages(path)[0]
     assert at == 0.0
     drawn = np.isfinite(first.twist_arcsec) & np.isfinite(first.output_torque)
-    assert drawn.sum() >= 1000
+    assert drawn.sum() >= 250
     assert np.ptp(np.array(first.output_torque)[drawn]) > 30
     assert np.ptp(np.array(first.twist_arcsec)[drawn]) > 100
 
 
-@pytest.mark.parametrize("n", [1, 2, 99, 100, 101, 250, 1999, 2000, 2001, 2101, 5000])
+@pytest.mark.parametrize("n", [1, 2, 99, 100, 101, 250, 500, 501, 1001, 1999, 2000, 2001, 2101, 5000])
 def test_a_loop_holds_the_run_around_its_moment_and_marks_where_it_is(tmp_path, n):
     state = twisted(n)
     path = tmp_path / "a.mcap"
@@ -150,6 +150,8 @@ def test_a_loop_holds_the_run_around_its_moment_and_marks_where_it_is(tmp_path, 
             rows = {name: Column(c.values[a:b], c.unit) for name, c in state.columns.items()}
             log.write("state", Table(state.time[a:b], rows))
     torque = state.columns["output_torque"].values
+    twist = state.columns["twist"].values * ARCSEC_PER_RAD
+    place = {pair: k for k, pair in enumerate(zip(twist, torque, strict=True))}
     messages = loop_messages(path)
     assert len(messages) == -(-n // LOOP_EVERY)
     assert (np.diff([at for at, _ in messages]) > 0).all()
@@ -157,15 +159,55 @@ def test_a_loop_holds_the_run_around_its_moment_and_marks_where_it_is(tmp_path, 
         begin = k * LOOP_EVERY
         assert at == pytest.approx(state.time[begin], abs=1e-9)
         whole = np.array(message.output_torque)
-        seen = whole[: min(n, LOOP_SAMPLES)]
-        assert np.isnan(whole[len(seen) :]).all()
         # One uninterrupted piece of the run, at its ends the first or the last samples.
         first = min(max(0, begin - LOOP_SAMPLES // 2), max(0, n - LOOP_SAMPLES))
-        np.testing.assert_array_equal(seen, torque[first : first + len(seen)])
+        size = min(n, LOOP_SAMPLES)
+        every = -(-size // LOOP_POINTS)
+        points = whole[np.isfinite(whole)]
+        assert np.isnan(whole[len(points) :]).all()
+        # Of each group of samples one; all of them in a short run.
+        pairs = zip(message.twist_arcsec, message.output_torque, strict=True)
+        chosen = np.array([place[pair] for pair in pairs if np.isfinite(pair[1])])
+        assert len(chosen) == len(points) == size // every + (n % every > 0 and n < LOOP_SAMPLES)
+        groups = chosen // every
+        assert (np.diff(groups) == 1).all()
+        assert first <= chosen[0] < first + 2 * every - 1
+        assert first + size - every <= chosen[-1] < first + size
         now = np.array(message.output_torque_now)
-        marked = np.flatnonzero(np.isfinite(now))
-        np.testing.assert_array_equal(marked + first, np.arange(begin, min(n, begin + LOOP_EVERY + 1)))
+        marked = np.isfinite(now)
         np.testing.assert_array_equal(now[marked], whole[marked])
+        inside = (chosen >= begin) & (chosen <= begin + LOOP_EVERY)
+        np.testing.assert_array_equal(marked[: len(chosen)], inside)
+        assert not marked[len(chosen) :].any()
+
+
+def test_the_points_of_a_loop_keep_its_shape_and_its_corners():
+    # A backlash loop: two straight branches, jumps through the gap, and one overshoot of a single sample.
+    phase = np.linspace(0, 2 * np.pi, 2000)
+    torque = 50 * np.sin(phase)
+    twist = 100 * np.sin(phase) + np.where(np.cos(phase) > 0, 20.0, -20.0)
+    torque[700] += 15
+    chosen = corners(twist, torque, 4)
+    assert (chosen // 4 == np.arange(500)).all()
+    assert 700 in chosen
+    assert torque[chosen].min() == pytest.approx(-50, abs=1e-3)
+    # No sample lies farther from the thinned curve than two pixels of a panel of 400.
+    x, y = twist / np.ptp(twist), torque / np.ptp(torque)
+    a, b = np.stack([x, y])[:, chosen[:-1], None], np.stack([x, y])[:, chosen[1:], None]
+    offset = np.stack([x, y])[:, None, chosen[0] : chosen[-1] + 1] - a
+    share = np.clip((offset * (b - a)).sum(0) / ((b - a) ** 2).sum(0), 0, 1)
+    distance = np.sqrt(((offset - share * (b - a)) ** 2).sum(0)).min(axis=0)
+    assert distance.max() < 5e-3
+
+
+def test_the_points_of_a_loop_may_be_missing_or_all_the_same():
+    gap = np.full(8, np.nan)
+    np.testing.assert_array_equal(corners(gap, gap, 4), [0, 4])
+    np.testing.assert_array_equal(corners(np.zeros(9), np.zeros(9), 4), [0, 4, 8])
+    half = np.array([0.0, 1.0, 9.0, 1.0, np.nan, np.nan, 5.0, np.nan])
+    np.testing.assert_array_equal(corners(half, half, 4)[1:], [6])
+    np.testing.assert_array_equal(corners(np.array([1.0]), np.array([2.0]), 1), [0])
+    np.testing.assert_array_equal(corners(np.array([1.0, np.inf]), np.array([2.0, 1.0]), 2), [0])
 
 
 def test_who_watches_a_run_sees_loops_of_what_there_is_and_the_log_of_what_comes(tmp_path):
@@ -192,7 +234,13 @@ def test_who_watches_a_run_sees_loops_of_what_there_is_and_the_log_of_what_comes
         count = round(1e-9 * (at - EPOCH_NS) * 1000) + 1
         held = np.array(message.output_torque)
         held = held[np.isfinite(held)]
-        np.testing.assert_array_equal(held, torque[max(0, count - LOOP_SAMPLES) : count])
+        recent = torque[max(0, count - LOOP_SAMPLES) : count]
+        every = -(-len(recent) // LOOP_POINTS)
+        assert len(recent) // every <= len(held) <= LOOP_POINTS
+        assert np.isin(held, recent).all()
+        assert np.isin(held[-1], recent[-every:])
+        if every == 1:
+            np.testing.assert_array_equal(held, recent)
     alone = write_log(Recording({"state": state}), tmp_path / "b.mcap")
     assert [m.SerializeToString() for _, m in loop_messages(path)] == [
         m.SerializeToString() for _, m in loop_messages(alone)

@@ -9,10 +9,11 @@ import pytest
 
 import hdsim
 from hdsim.drive.ratings import ratings
-from hdsim.recording import Column, Table
+from hdsim.recording import Column, Event, Table
 from hdsim.scenario.model import Scenario
-from hdsim.simulation.events import MOST, EventDetector
+from hdsim.simulation.events import EventDetector
 from hdsim.simulation.limits import Bearing
+from hdsim.simulation.quota import BURST, MOST, Quota
 from hdsim.simulation.setup import build_model, build_run
 from hdsim.simulation.solvers import Statistics
 from hdsim.simulation.watches import Flanks, Watch
@@ -162,19 +163,64 @@ def block(time: np.ndarray, **channels: np.ndarray) -> dict[str, Table]:
     return {"state": Table(time, {name: Column(values, "1") for name, values in columns.items()})}
 
 
-def test_many_events_of_a_kind_are_counted():
+def crossing_run(block_size: int) -> list[Event]:
+    """100 s of a torque that changes its sign twice a second, the first 40 s and in the last of them."""
     detector = EventDetector(build_model(scenario()), 100.0)
     time = np.arange(100_000) * 1e-3
-    torque = 5 * np.sin(2 * np.pi * time)
-    events = []
-    for k in range(0, len(time), 1000):
-        rows = slice(k, k + 1000)
+    torque = np.where((time < 40) | (time > 98.8), 5 * np.sin(2 * np.pi * time), -5.0)
+    events: list[Event] = []
+    for k in range(0, len(time), block_size):
+        rows = slice(k, k + block_size)
         events += detector.feed(block(time[rows], output_torque=torque[rows]), 1.0, Statistics())
-    crossings = [e for e in events if "gap crossed" in e.message]
-    assert len(crossings) == 2 * MOST
-    last = detector.finish(100.0, None)
-    assert [e.message.split(" ")[0] for e in last[:-1]] == [str(100 - MOST), str(99 - MOST)]
-    assert last[-1].message == "run ends"
+    return events + detector.finish(100.0, None)
+
+
+def test_many_events_of_a_kind_are_spread_over_the_run_and_counted():
+    events = crossing_run(1000)
+    assert [e.time for e in events] == sorted(e.time for e in events)
+    single = [e for e in events if e.message.startswith("gap crossed")]
+    counted = [e for e in events if e.message.endswith("s: gap crossed")]
+    # At once what comes at once, then one each eighth of the run; after a quiet time again, to the last.
+    assert [round(e.time, 1) for e in single] == [0.5, 1.0, 1.5, 2.0, 13.0, 25.5, 38.0, 99.0, 99.5]
+    assert len(single) <= MOST
+    assert [int(e.message.split()[0]) for e in counted] == [21, 24, 24, 3]
+    until = [float(e.message.split(" until ")[1].split()[0]) for e in counted]
+    np.testing.assert_allclose(until, [12.5, 25.0, 37.5, 39.5], atol=0.01)
+    # As soon as the next one is told, or it has been quiet for an eighth of the run.
+    assert [round(e.time, 1) for e in counted] == [13.0, 25.5, 38.0, 52.0]
+    # Each crossing is told or counted.
+    assert len(single) + sum(int(e.message.split()[0]) for e in counted) == 81
+
+
+@pytest.mark.parametrize("block_size", [17, 100_000])
+def test_what_is_told_of_many_events_does_not_depend_on_how_the_samples_are_cut(block_size):
+    whole = [(round(e.time, 6), e.message) for e in crossing_run(1000)]
+    assert [(round(e.time, 6), e.message) for e in crossing_run(block_size)] == whole
+
+
+def test_an_end_is_told_if_its_beginning_was():
+    quota = Quota("up", 80.0, "down")
+    told = []
+    for k in range(400):
+        pair = [Event(0.2 * k, "warning", "x", "up"), Event(0.2 * k + 0.1, "info", "x", "down")]
+        told += quota.feed(pair, 0.2 * (k + 1) - 1e-9)
+    told += quota.finish(80.0)
+    singles = [e.message for e in told if "more" not in e.message]
+    assert singles == ["up", "down"] * (len(singles) // 2)
+    assert BURST < len(singles) // 2 <= MOST
+    assert len(singles) // 2 + sum(int(e.message.split()[0]) for e in told if "more" in e.message) == 400
+    assert {e.level for e in told if "more" in e.message} == {"warning"}
+    assert told[-1].message.endswith("more times until 79.9 s: up")
+
+
+def test_the_chatter_of_a_whole_run_is_told_to_its_end():
+    run = build_run(hdsim.load_scenario(SCENARIOS / "constant_speed.yaml"))
+    events = run.record().events
+    told = [e for e in events if e.source == "mesh"]
+    # Hundreds of times the teeth leave contact; in each quarter of the run something is said of it.
+    quarters = np.histogram([e.time for e in told], 4, (0, run.duration_s))[0]
+    assert (quarters >= 4).all()
+    assert len(told) < 6 * MOST
 
 
 def test_doubts_about_the_solution_are_told():
