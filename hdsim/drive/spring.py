@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,6 +46,18 @@ def catalogue_wind_up(torsion: Torsion, torque: Array) -> Array:
             ramp = ramp - at_zero
         twist = twist + change * ramp
     return np.sign(torque) * twist
+
+
+@lru_cache(maxsize=32)
+def catalogue_cells(torsion: Torsion, largest_torque_nm: float) -> tuple[float, Array]:
+    """Torque over twist of the catalogue's wind-up alone, see ``spring_cells``; not to be written to.
+
+    Kept for the next model: a fit makes hundreds that differ in other numbers.
+    """
+    corners = [torsion.torque_t1_nm, torsion.torque_t2_nm]
+    step, cells = spring_cells([partial(catalogue_wind_up, torsion)], corners, largest_torque_nm)
+    cells.setflags(write=False)
+    return step, cells
 
 
 def structure_wind_up(
