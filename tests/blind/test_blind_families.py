@@ -145,13 +145,13 @@ def check_null(case: Case) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(0, 80, 8))
+@pytest.mark.parametrize("number", range(0, 80, 16))
 def test_a_mujoco_null_is_null(mujoco_family, number):
     check_null(mujoco_family.draw(number, 1))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(0, 80, 8))
+@pytest.mark.parametrize("number", range(0, 80, 16))
 def test_a_toothed_null_is_null(number):
     check_null(family_toothed.draw(number, 1))
 
