@@ -14,6 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from hdsim.errors import InputError
+from hdsim.log.facts import SPEEDS as SPEEDS
+from hdsim.log.facts import Facts
+from hdsim.log.facts import playback_speed as playback_speed
 from hdsim.log.panels import Panel, Split, column, events, gauge, lamp, plot, row, scene
 
 STATE = "/hd/state_view"
@@ -25,25 +28,11 @@ STATIC = "/hd/static_view"
 Topics = Mapping[str, Collection[str]]
 """Fields of every topic of a log, by topic."""
 
-_SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-_SHORT_S, _LONG_S = 10.0, 60.0
 _NOW_STYLE = {"color": "#ff3b30", "lineSize": 2.0}
 _CURVE_STYLE = {"color": "#4e98e2", "lineSize": 0.8}
 _AFTER_STYLE, _BEFORE_STYLE, _MEASURED_STYLE = ({"color": c} for c in ("#128a3c", "#f5774d", "#7fa8d8"))
 _CAMERA_DISTANCE = 5.0
 """Of the camera from the drive, in pitch radii."""
-
-
-def playback_speed(duration: float) -> float:
-    """Speed at which a run of ``duration`` s is pleasant to watch: 10 s to a minute where viewers can.
-
-    Viewers play at 0.01 to 5 times real time.
-    """
-    if duration <= 0:
-        return 1.0
-    if duration < _SHORT_S:
-        return max((s for s in _SPEEDS if duration / s >= _SHORT_S), default=_SPEEDS[0])
-    return min((s for s in _SPEEDS if s >= 1 and duration / s <= _LONG_S), default=_SPEEDS[-1])
 
 
 def _motion() -> Panel:
@@ -191,7 +180,12 @@ def split_path(path: str) -> tuple[str, str]:
 
 
 def build_layout(
-    name: str, *, topics: Topics | None = None, duration: float | None = None, drive_radius: float = 0.025
+    name: str,
+    *,
+    topics: Topics | None = None,
+    duration: float | None = None,
+    drive_radius: float = 0.025,
+    facts: Facts | None = None,
 ) -> dict[str, Any]:
     """A layout as the viewer imports it.
 
@@ -200,6 +194,7 @@ def build_layout(
         topics: what a log has; lines and panels that it cannot fill are left out. None keeps all.
         duration: length of the run in s, for the playback speed.
         drive_radius: pitch radius in m, for the distance of the camera.
+        facts: what else the layout is fitted to.
 
     Raises:
         InputError: an unknown name, or a log that has nothing to show in this layout.
@@ -214,21 +209,28 @@ def build_layout(
         tree = _prune(tree, topics) if NEEDED.get(name) in (None, *topics) else None
     if tree is None or all(panel.kind == "RosOut" for panel in _panels(tree)):
         raise InputError(f"the log has no topic that layout {name!r} shows")
+    facts = facts or Facts()
+    turning = any(panel.kind == "3D" for panel in _panels(tree))
+    speed = playback_speed(duration or 0.0, facts.motor_speed_rad_per_s if turning else 0.0)
     return {
         "configById": {p.id: _settings(p, drive_radius) for p in _panels(tree)},
         "globalVariables": {},
         "userNodes": {},
-        "playbackConfig": {"speed": playback_speed(duration) if duration is not None else 1.0},
+        "playbackConfig": {"speed": speed},
         "layout": _nest(tree),
     }
 
 
-def layouts_of_log(topics: Topics, duration: float, drive_radius: float = 0.025) -> dict[str, str]:
+def layouts_of_log(
+    topics: Topics, duration: float, drive_radius: float = 0.025, facts: Facts | None = None
+) -> dict[str, str]:
     """All layouts that have something to show in a log, by file name, as JSON."""
     found = {}
     for name in LAYOUTS:
         try:
-            layout = build_layout(name, topics=topics, duration=duration, drive_radius=drive_radius)
+            layout = build_layout(
+                name, topics=topics, duration=duration, drive_radius=drive_radius, facts=facts
+            )
         except InputError:
             continue
         found[f"layout-{name}.json"] = to_json(layout)

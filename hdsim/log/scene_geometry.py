@@ -21,6 +21,8 @@ GEOMETRY_KEY = "geometry"
 #: What a recording needs for a scene, and the errors that it shows, the first that is there.
 ANGLES = ("motor_angle", "output_angle")
 ERROR_CHANNELS = ("transmission_error", "tracking_error")
+MEASURED_OUTPUT = "measured_output_angle"
+"""Channel of a machine that is shown beside the drive, as a ghost pointer."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,9 @@ class SceneGeometry:
         deflection_factor: by how much the flexspline's deflection is exaggerated.
         error_factor: by how much the error of the output is exaggerated.
         largest_force_n: force at the end of the colour scale.
+        arm_angle_rad: where the arm on the output points at output angle 0; 0 is right, pi/2 up.
+        gravity: whether gravity pulls at the arm; it points down, as drawn.
+        half_gap_m: play of a tooth to each side, along the pitch circle.
     """
 
     flexspline_teeth: int = 200
@@ -44,6 +49,9 @@ class SceneGeometry:
     deflection_factor: float = 6.0
     error_factor: float = 500.0
     largest_force_n: float = 50.0
+    arm_angle_rad: float = 0.0
+    gravity: bool = False
+    half_gap_m: float = 0.0
 
     @classmethod
     def from_metadata(cls, metadata: Mapping[str, str]) -> SceneGeometry:
@@ -56,10 +64,22 @@ class SceneGeometry:
             raise InputError(f"the metadata's {GEOMETRY_KEY} is no drive geometry: {error}") from None
 
     @property
+    def ratio(self) -> float:
+        """Motor angle over output angle; negative where the output turns against the motor."""
+        difference = self.circular_spline_teeth - self.flexspline_teeth
+        if self.circular_spline_fixed:
+            return -self.flexspline_teeth / difference
+        return self.circular_spline_teeth / difference
+
+    @property
+    def deflection(self) -> float:
+        """Radial deflection of the flexspline on the major axis, m: the difference of the pitch radii."""
+        return self.pitch_radius_m * (1.0 - self.flexspline_teeth / self.circular_spline_teeth)
+
+    @property
     def drawn_deflection(self) -> float:
-        """Radial deflection as drawn, in m: the difference of the two pitch radii times its factor."""
-        difference = 1.0 - self.flexspline_teeth / self.circular_spline_teeth
-        return self.pitch_radius_m * difference * self.deflection_factor
+        """The same as drawn."""
+        return self.deflection * self.deflection_factor
 
     @property
     def tooth_height(self) -> float:
@@ -71,6 +91,24 @@ class SceneGeometry:
         spline on the major axis.
         """
         return self.pitch_radius_m - self.drawn_deflection * (1.0 - np.cos(2.0 * angle))
+
+    def place(self, angle: Array) -> Array:
+        """Where a tooth stands that is at an angle from the major axis before the ring is deformed.
+
+        A ring that keeps its length moves round, too, by half its radial deflection times sin 2 phi. That
+        is what keeps the teeth in the middle of the circular spline's spaces over a wide arc. It is drawn
+        as it is, not exaggerated.
+        """
+        return angle - 0.5 * self.deflection / self.pitch_radius_m * np.sin(2.0 * angle)
+
+
+def rounded_up(value: float) -> float:
+    """The next number that reads well: 1, 1.5, 2, 3, 4, 5, 6 or 8 times a power of ten."""
+    if not (np.isfinite(value) and value > 0):
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    digits = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+    return float(power * next(d for d in digits if d >= value / power * (1 - 1e-9)))
 
 
 def geometry_of(recording: Recording) -> SceneGeometry:
@@ -95,5 +133,5 @@ def geometry_of(recording: Recording) -> SceneGeometry:
         flexspline_teeth=count,
         circular_spline_teeth=count + difference,
         error_factor=factor,
-        largest_force_n=force,
+        largest_force_n=rounded_up(force),
     )

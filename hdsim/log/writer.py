@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,6 +15,7 @@ from hdsim.errors import InputError
 from hdsim.log import naming
 from hdsim.log.container import Container, Watch, opened
 from hdsim.log.events import event_message
+from hdsim.log.facts import RECORD, FactsCollector
 from hdsim.log.joint_states import MESSAGE_TYPE, JointStateStream, has_joints
 from hdsim.log.streams import MessageStream, TableStream
 from hdsim.log.view import DEFAULT_VIEW_RATE_HZ, MinMaxView
@@ -76,6 +78,7 @@ class LogWriter:
         self._views: dict[str, ViewStream] = {}
         self._topics: dict[str, list[str]] = {}
         self._layouts = layouts
+        self._facts = FactsCollector(metadata)
         self.drive_radius = 0.025
         self._channels = 0
         self._tables: dict[str, TableStream] = {}
@@ -151,11 +154,10 @@ class LogWriter:
         """
         time = np.asarray(block.time, np.float64)
         specs = naming.describe_columns(block.columns, rows=True)
-        stream = self._tables.get(name)
-        if stream is None:
-            stream = self._add_table(name, naming.topic_of(name), specs, specs)
+        stream = self._tables.get(name) or self._add_table(name, naming.topic_of(name), specs, specs)
         columns = [np.asarray(c.values, np.float64) for c in block.columns.values()]
         stream.check(name, time, specs, columns)
+        self._facts.feed(name, time, dict(zip(block.columns, columns, strict=True)))
         log_times = naming.to_ns(time)
         with_joints = name in _JOINT_TABLES and has_joints(list(block.columns))
         # The view is fed chunk by chunk, so that the file doesn't depend on how the run was cut in blocks.
@@ -277,11 +279,7 @@ class LogWriter:
         text = naming.columns_to_json(described)
         self._container.metadata(naming.TABLE_RECORD + name, {"topic": topic, "columns": text})
 
-        def make(
-            topic: str, kind: str, fields: Sequence[naming.ColumnSpec], about: dict[str, str]
-        ) -> TableStream:
-            return self._stream(topic, kind, fields, about, time=time)
-
+        make = partial(self._stream, time=time)
         message_type = naming.message_type_of(name)
         self._tables[name] = stream = make(topic, message_type, layout, {"columns": text})
         if name in naming.VIEWED_TABLES:
@@ -317,8 +315,10 @@ class LogWriter:
         if not self._layouts:
             return
         topics = {topic: self._topics.get(topic, []) for topic in self._container.topics}
-        for name, text in layouts_of_log(topics, self._container.duration, self.drive_radius).items():
+        facts = self._facts.facts()
+        for name, text in layouts_of_log(topics, self._container.duration, self.drive_radius, facts).items():
             self._container.attachment(name, "application/json", text.encode(), naming.EPOCH_NS)
+        self._container.metadata(RECORD, facts.record)
 
     def _flush_messages(self) -> None:
         for stream in self._messages.values():

@@ -1,17 +1,20 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from driving import drive_run
 
 import hdsim.log
 from hdsim.errors import InputError
-from hdsim.log import commands, info_log, layout, read_attachments, verify_log, write_log
-from hdsim.recording import Recording, Table
+from hdsim.log import LogWriter, commands, info_log, layout, read_attachments, verify_log, write_log
+from hdsim.log.facts import Facts
+from hdsim.recording import Column, Recording, Table
 
 SHIPPED = Path(hdsim.log.__file__).parent / "layouts"
 
@@ -86,7 +89,8 @@ def test_logs_carry_the_layouts_that_they_can_fill(tmp_path):
         "layout-tooth-contact.json",
     ]
     for built in found.values():
-        assert built["playbackConfig"]["speed"] == 0.02
+        # The motor turns at 250 rad/s.
+        assert built["playbackConfig"]["speed"] == 0.01
         for path_text in message_paths(built):
             topic, field = layout.split_path(path_text)
             assert not field or field in info_log(path).fields[topic]
@@ -135,6 +139,36 @@ def test_lines_are_told_apart_by_what_differs():
 )
 def test_short_runs_play_slowly_and_long_ones_fast(duration, speed):
     assert layout.playback_speed(duration) == speed
+
+
+@pytest.mark.parametrize(
+    ("rpm", "speed"), [(0, 1.0), (200, 1.0), (240, 1.0), (241, 0.5), (600, 0.2), (2000, 0.1), (1e6, 0.01)]
+)
+def test_what_turns_fast_plays_slowly(rpm, speed):
+    """At four turns a second and 30 frames a second an ellipse turns by 48 degrees a frame."""
+    facts = Facts(motor_speed_rad_per_s=rpm * 2 * math.pi / 60)
+    built = layout.build_layout("overview", duration=20.0, facts=facts)
+    assert built["playbackConfig"]["speed"] == speed
+    # A layout that shows nothing turn need not be slow.
+    assert layout.build_layout("diagnose", duration=20.0, facts=facts)["playbackConfig"]["speed"] == 1.0
+
+
+@pytest.mark.parametrize("size", [7, 400, 10**6])
+def test_the_log_knows_how_fast_its_motor_turned(tmp_path, size):
+    run = drive_run(duration=2.0)
+    path = tmp_path / "a.mcap"
+    with LogWriter(path, metadata=run.metadata) as log:
+        for name, table in run.tables.items():
+            for begin in range(0, len(table), size):
+                rows = slice(begin, begin + size)
+                columns = {n: Column(c.values[rows], c.unit) for n, c in table.columns.items()}
+                log.write(name, Table(table.time[rows], columns))
+    facts = info_log(path).facts
+    assert facts.motor_speed_rad_per_s == pytest.approx(np.abs(run["motor_velocity"]).max(), rel=1e-3)
+    assert facts.slowest_rad_per_s < 1.0
+    assert facts.teeth_rate_hz == pytest.approx(50.0)
+    assert facts.largest_force_n == pytest.approx(np.abs(run.tables["teeth"]["normal_force"]).max())
+    assert not facts.steady
 
 
 def test_an_empty_log_has_no_layout(tmp_path):
