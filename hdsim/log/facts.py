@@ -121,6 +121,7 @@ class FactsCollector:
     def __init__(self, metadata: Mapping[str, str]) -> None:
         self._known = Facts.of_metadata(metadata)
         self._last: tuple[float, float] | None = None
+        self._window = -np.inf
         self._fastest = 0.0
         self._slowest = np.inf
         self._force = 0.0
@@ -143,11 +144,14 @@ class FactsCollector:
         time, angle = time[good], angle[good]
         if not len(time):
             return
-        first = np.diff(np.floor(time / _SPEED_WINDOW_S), prepend=-np.inf) != 0
+        window = np.floor(time / _SPEED_WINDOW_S)
+        # The first sample of each window, however the run is cut into blocks.
+        first = np.diff(window, prepend=self._window) != 0
+        self._window = float(window[-1])
         time, angle = time[first], angle[first]
+        if not len(time):
+            return
         if self._last is not None:
-            if time[0] - self._last[0] < 0.5 * _SPEED_WINDOW_S:
-                time, angle = time[1:], angle[1:]
             time, angle = np.append(self._last[0], time), np.append(self._last[1], angle)
         if len(time) > 1:
             speed = np.abs(np.diff(angle)) / np.diff(time)

@@ -60,7 +60,7 @@ def _outline(radius: Array, middle: Array, half_width: Array) -> Array:
 def flexspline_outline(g: SceneGeometry) -> Array:
     """Outline (6 teeth, 3) of the toothed flexspline in its frame; the major axis is x."""
     h, half = g.tooth_height, _half_width(g)
-    angle: Array = np.arange(g.flexspline_teeth) * (2 * np.pi / g.flexspline_teeth)
+    angle = np.linspace(0.0, 2 * np.pi, g.flexspline_teeth, endpoint=False)
     heights = h * np.array([_ROOT, _TIP - 0.2, _TIP, _TIP, _TIP - 0.2, _ROOT])
     widths = half * np.array([-1.0, -1.0, -0.6, 0.6, 1.0, 1.0])
     return _outline(g.radius(angle)[:, None] + heights, g.place(angle), widths)
@@ -73,8 +73,8 @@ def circular_spline_outline(g: SceneGeometry) -> Array:
     space = _half_width(g) + g.half_gap_m * g.flexspline_teeth / g.circular_spline_teeth
     heights = h * np.array([0.0, 0.15, 0.95, 0.95, 0.15, 0.0])
     widths = space + _half_width(g) * np.array([0.4, 0.0, 0.0, 0.0, 0.0, 0.4])
-    middle = np.arange(g.circular_spline_teeth) * (2 * np.pi / g.circular_spline_teeth)
-    radius: Array = np.full((len(middle), 6), g.pitch_radius_m) + heights
+    middle = np.linspace(0.0, 2 * np.pi, g.circular_spline_teeth, endpoint=False)
+    radius = np.full((len(middle), 6), g.pitch_radius_m) + heights
     return _outline(radius, middle, widths * np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]))
 
 
