@@ -24,8 +24,6 @@ _MOST_TURNS_PER_S = 4.0
 _SPEED_WINDOW_S = 2e-3
 """Time over which a motor's speed is taken: longer than a sensor's noise, shorter than a move."""
 _MOTOR_TABLES = ("state", "measured")
-_STEADY = 0.02
-"""Spread of the motor's speed about its mean, as a share, up to which a run has one speed."""
 
 
 @dataclass(frozen=True)
@@ -34,18 +32,26 @@ class Facts:
 
     Args:
         motor_speed_rad_per_s: the highest speed of the motor, over two milliseconds or a sample; 0: at rest.
-        slowest_rad_per_s: the lowest one.
         teeth_rate_hz: how often the teeth's forces are sampled; 0: once at most, or never.
-        largest_force_n: of a tooth, in the run; 0: none.
+        lowest_force_n: of a tooth, signed by its flank.
+        highest_force_n: the other end.
+        lowest_output_torque_nm: of the drive on the output.
+        highest_output_torque_nm: the other end.
+        lowest_motor_torque_nm: of the motor.
+        highest_motor_torque_nm: the other end.
         rated_torque_nm: of the drive; 0: unknown.
         torque_limit_nm: of the motor; 0: none.
         verdict: what a diagnosis found, in a few words; none: "".
     """
 
     motor_speed_rad_per_s: float = 0.0
-    slowest_rad_per_s: float = 0.0
     teeth_rate_hz: float = 0.0
-    largest_force_n: float = 0.0
+    lowest_force_n: float = 0.0
+    highest_force_n: float = 0.0
+    lowest_output_torque_nm: float = 0.0
+    highest_output_torque_nm: float = 0.0
+    lowest_motor_torque_nm: float = 0.0
+    highest_motor_torque_nm: float = 0.0
     rated_torque_nm: float = 0.0
     torque_limit_nm: float = 0.0
     verdict: str = ""
@@ -78,10 +84,9 @@ class Facts:
         return {name: str(value) for name, value in asdict(self).items()}
 
     @property
-    def steady(self) -> bool:
-        """Whether the motor turned at one speed all the time."""
-        fast = self.motor_speed_rad_per_s
-        return fast > 0 and fast - self.slowest_rad_per_s <= _STEADY * fast
+    def largest_force_n(self) -> float:
+        """Of a tooth in the run, on either flank; 0: none."""
+        return max(self.highest_force_n, -self.lowest_force_n)
 
     @property
     def teeth_follow_the_mesh(self) -> bool:
@@ -123,8 +128,7 @@ class FactsCollector:
         self._last: tuple[float, float] | None = None
         self._window = -np.inf
         self._fastest = 0.0
-        self._slowest = np.inf
-        self._force = 0.0
+        self._ends: dict[str, float] = {}
         self._teeth_times: list[float] = []
 
     def feed(self, table: str, time: Array, columns: Mapping[str, Array]) -> None:
@@ -135,9 +139,16 @@ class FactsCollector:
             self._motor(time, columns["motor_angle"])
         if table == "teeth":
             self._teeth_times = [*self._teeth_times, *time[:2].tolist()][:2]
-            force = columns.get("normal_force")
-            if force is not None and np.isfinite(force).any():
-                self._force = max(self._force, float(np.nanmax(np.abs(force))))
+            self._range("force_n", columns.get("normal_force"))
+        if table in _MOTOR_TABLES:
+            self._range("output_torque_nm", columns.get("output_torque"))
+            self._range("motor_torque_nm", columns.get("motor_torque"))
+
+    def _range(self, quantity: str, values: Array | None) -> None:
+        if values is not None and np.isfinite(values).any():
+            for end, found in (("lowest", np.fmin), ("highest", np.fmax)):
+                name = f"{end}_{quantity}"
+                self._ends[name] = float(found(self._ends.get(name, 0.0), found.reduce(values, axis=None)))
 
     def _motor(self, time: Array, angle: Array) -> None:
         good = np.isfinite(angle)
@@ -156,16 +167,15 @@ class FactsCollector:
         if len(time) > 1:
             speed = np.abs(np.diff(angle)) / np.diff(time)
             self._fastest = max(self._fastest, float(speed.max()))
-            self._slowest = min(self._slowest, float(speed.min()))
         self._last = (float(time[-1]), float(angle[-1]))
 
     def facts(self) -> Facts:
         """What is known so far."""
         apart = self._teeth_times[-1] - self._teeth_times[0] if self._teeth_times else 0.0
-        return replace(
+        found = replace(
             self._known,
             motor_speed_rad_per_s=self._fastest,
-            slowest_rad_per_s=self._slowest if np.isfinite(self._slowest) else 0.0,
             teeth_rate_hz=1.0 / apart if apart > 0 else 0.0,
-            largest_force_n=self._force,
         )
+        ends: dict[str, Any] = {**self._ends}
+        return replace(found, **ends)

@@ -19,7 +19,14 @@ from hdsim.errors import InputError
 from hdsim.log import naming, panels, scene_teeth, schemas, shapes
 from hdsim.log.scene_bodies import new_entity, static_entities
 from hdsim.log.scene_frames import Ticks, Turns, frame_angles, frames_per_second, transform_messages
-from hdsim.log.scene_geometry import ANGLES, ERROR_CHANNELS, GEOMETRY_RECORD, MEASURED_OUTPUT, geometry_of
+from hdsim.log.scene_geometry import (
+    ANGLES,
+    ERROR_CHANNELS,
+    GEOMETRY_RECORD,
+    MEASURED_OUTPUT,
+    drawn_state,
+    geometry_of,
+)
 from hdsim.log.scene_geometry import SceneGeometry as SceneGeometry
 
 if TYPE_CHECKING:
@@ -114,12 +121,14 @@ class SceneWriter:
 
 def write_scene(log: LogWriter, recording: Recording, geometry: SceneGeometry | None = None) -> None:
     """Write the scene of a recording that has the two angles; the geometry is `geometry_of` it by default."""
-    state = recording.tables.get("state")
-    if state is None or not len(state) or not all(c in state and state[c].ndim == 1 for c in ANGLES):
+    state = drawn_state(recording)
+    if state is None:
         return
-    time = state.time
     chosen = geometry or geometry_of(recording)
-    SceneWriter(log, chosen, float(time[-1] - time[0])).write(recording.tables)
+    tables = {"state": state}
+    if "teeth" in recording.tables:
+        tables["teeth"] = recording.tables["teeth"]
+    SceneWriter(log, chosen, float(state.time[-1] - state.time[0])).write(tables)
 
 
 def _scene_schema() -> bytes:

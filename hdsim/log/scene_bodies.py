@@ -88,15 +88,15 @@ def _legend(g: SceneGeometry, at: int, *, with_error: bool, with_measured: bool)
     words = f"drawn larger: deflection x{g.deflection_factor:g}"
     if with_error:
         words += f", error of the output x{g.error_factor:g} (red)"
-    write(words, 0.0, 1.90)
+    write(words, 0.0, 1.82)
     if with_measured:
-        write("pale blue: error of the measured machine", 0.0, -1.90)
+        write("pale blue: error of the measured machine", 0.0, -1.82)
     steps = np.linspace(0.0, 1.0, 16)
     x = np.repeat(-0.6 + 0.075 * np.arange(16), 2) + np.tile([0.0, 0.075], 16)
-    bar = np.column_stack([x, np.full(32, 1.75), np.full(32, 0.2)]) * r
+    bar = np.column_stack([x, np.full(32, 1.68), np.full(32, 0.2)]) * r
     _add_line(legend, shapes.segments(bar, np.repeat(shapes.force_colours(steps), 2, axis=0), 9.0))
-    write("tooth force 0 N", -1.05, 1.75)
-    write(f"{g.largest_force_n:g} N", 0.85, 1.75)
+    write("tooth force 0 N", -1.2, 1.68)
+    write(f"{g.largest_force_n:g} N", 0.9, 1.68)
     if g.gravity:
         arrow = np.array([[0, 0], [0, -0.45], [0, -0.45], [-0.07, -0.33], [0, -0.45], [0.07, -0.33]])
         points = np.column_stack([arrow + np.array([-1.6, -1.2]), np.full(6, 0.2)]) * r

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdsim.errors import InputError
+from hdsim.log import naming
 from hdsim.log.shapes import Array
+from hdsim.recording import Table
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -21,6 +23,7 @@ GEOMETRY_KEY = "geometry"
 #: What a recording needs for a scene, and the errors that it shows, the first that is there.
 ANGLES = ("motor_angle", "output_angle")
 ERROR_CHANNELS = ("transmission_error", "tracking_error")
+_LEAST_TEETH, _MOST_TEETH = 20, 700
 MEASURED_OUTPUT = "measured_output_angle"
 """Channel of a machine that is shown beside the drive, as a ghost pointer."""
 
@@ -111,9 +114,67 @@ def rounded_up(value: float) -> float:
     return float(power * next(d for d in digits if d >= value / power * (1 - 1e-9)))
 
 
+def drawn_state(recording: Recording) -> Table | None:
+    """The angles that a scene shows: the state's; of a comparison the model's, with the measured ones beside.
+
+    Where a comparison has one angle only, the ratio gives the other.
+
+    A measured error is drawn about its mean, because the zeros of two encoders need not agree.
+
+    Returns:
+        None where an angle is missing.
+    """
+    tables = recording.tables
+    state = tables.get("state")
+    if state is None and "measured" in tables:
+        measured, after = tables["measured"], tables.get("after")
+        state = Table(measured.time, dict(measured.columns))
+        if after is not None and "output_angle" in after and "output_angle" in measured:
+            state.columns[MEASURED_OUTPUT] = measured.columns["output_angle"]
+            state.columns |= {c: after.columns[c] for c in ("output_angle", *ERROR_CHANNELS) if c in after}
+        elif "ratio" in recording.metadata:
+            _add_other_angle(state, float(recording.metadata["ratio"]))
+    if state is None or not len(state) or not all(c in state and state[c].ndim == 1 for c in ANGLES):
+        return None
+    if MEASURED_OUTPUT not in state and _is_measured(recording):
+        state = Table(state.time, dict(state.columns))
+        for name in ERROR_CHANNELS:
+            if name in state and np.isfinite(state[name]).any():
+                centred = state[name] - np.nanmean(state[name])
+                state.columns[name] = replace(state.columns[name], values=centred)
+    return state
+
+
+def _add_other_angle(state: Table, ratio: float) -> None:
+    """Of a machine with one encoder: the angle on the other side, as the ratio has it."""
+    for one, other, factor in (
+        ("motor_angle", "output_angle", 1 / ratio),
+        ("output_angle", "motor_angle", ratio),
+    ):
+        if one in state and other not in state:
+            state.columns[other] = replace(state.columns[one], values=state[one] * factor)
+            return
+
+
+def _is_measured(recording: Recording) -> bool:
+    return recording.metadata.get(naming.ORIGIN_KEY) == naming.MEASURED
+
+
+def _of_ratio(g: SceneGeometry, ratio: float) -> SceneGeometry:
+    """The geometry of a machine whose ratio alone is known: two teeth of difference, as most drives."""
+    teeth = round(2 * abs(ratio))
+    if not _LEAST_TEETH <= teeth <= _MOST_TEETH:
+        return g
+    if ratio < 0:
+        return replace(g, flexspline_teeth=teeth, circular_spline_teeth=teeth + 2)
+    return replace(g, flexspline_teeth=teeth - 2, circular_spline_teeth=teeth, circular_spline_fixed=False)
+
+
 def geometry_of(recording: Recording) -> SceneGeometry:
     """Geometry that a recording tells: its metadata's, its tooth count, scales for its forces and errors."""
     g = SceneGeometry.from_metadata(recording.metadata)
+    if GEOMETRY_KEY not in recording.metadata and "ratio" in recording.metadata:
+        g = _of_ratio(g, float(recording.metadata["ratio"]))
     teeth = recording.tables.get("teeth")
     count, force = g.flexspline_teeth, g.largest_force_n
     if teeth is not None and "normal_force" in teeth and len(teeth):
@@ -121,7 +182,8 @@ def geometry_of(recording: Recording) -> SceneGeometry:
         largest = float(np.nanmax(np.abs(teeth["normal_force"])))
         force = largest if largest > 0 else force
     factor = g.error_factor
-    error = next((recording[c] for c in ERROR_CHANNELS if c in recording), None)
+    state = drawn_state(recording)
+    error = None if state is None else next((state[c] for c in ERROR_CHANNELS if c in state), None)
     if error is not None and np.isfinite(error).any() and np.nanmax(np.abs(error)) > 0:
         # The largest error points a sixth of a turn away, by a factor of one digit.
         wanted = np.pi / 6 / float(np.nanmax(np.abs(error[np.isfinite(error)])))
