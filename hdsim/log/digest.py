@@ -12,7 +12,7 @@ from hdsim.log.orders import ORDERS, OVER_ANGLE, OrderCollector
 if TYPE_CHECKING:
     from hdsim.log.writer import LogWriter
 
-_STATES_OF_VIEW = 0.1
+_STATES_OF_VIEW = 0.03
 """Samples that are looked at for changes of state, as a share of the view's."""
 
 
@@ -36,19 +36,22 @@ class Digest:
         self._facts.feed(table, time, columns)
         self._orders.feed(table, time, columns)
         if table == "state":
-            times, found = self._states.feed(time, columns)
-            if found:
-                self._log.write_messages(
-                    states.TOPIC,
-                    states.MESSAGE_TYPE,
-                    lambda: states.schema(self._states.fields),
-                    naming.to_ns(times).tolist(),
-                    found,
-                    fields=self._states.fields,
-                )
+            self._write_states(*self._states.feed(time, columns))
+
+    def _write_states(self, times: naming.Array, messages: list[bytes]) -> None:
+        if messages:
+            self._log.write_messages(
+                states.TOPIC,
+                states.MESSAGE_TYPE,
+                lambda: states.schema(self._states.fields),
+                naming.to_ns(times).tolist(),
+                messages,
+                fields=self._states.fields,
+            )
 
     def finish(self) -> Facts:
         """Write what is known at the end only; returns the facts."""
+        self._write_states(*self._states.finish())
         spectrum = self._orders.spectrum()
         if spectrum is not None:
             degrees, arcsec = ("output_angle_deg", "deg"), ("transmission_error_arcsec", "arcsec")

@@ -131,7 +131,7 @@ def _states() -> Panel:
 def overview(facts: Facts) -> Split:
     """The drive turning, where it should be, how far off it is, and what loads it."""
     return row(
-        (37, column((57, scene()), (26, _states()), (17, events()))),
+        (37, column((53, scene()), (30, _states()), (17, events()))),
         (31, column((34, mesh()), (33, _motion()), (33, _errors()))),
         (
             32,

@@ -34,14 +34,14 @@ def static_entities(g: SceneGeometry, at: int, *, with_error: bool, with_measure
     around = np.linspace(0.0, 2 * np.pi, 181)[:-1]
     spline = new_entity("circular spline", "circular_spline", at)
     inner = scene_teeth.circular_spline_outline(g)
-    outer = shapes.polar(1.25 * r, np.arctan2(inner[:, 1], inner[:, 0]))
+    outer = shapes.polar(1.25 * r, scene_teeth.middles(inner))
     spline.triangles.append(shapes.prism(outer, inner, -0.10 * r, 0.10 * r, _STEEL))
     mark = shapes.polar(np.array([1.12, 1.25]) * r, np.zeros(2), 0.12 * r)
     _add_line(spline, shapes.segments(mark, _WHITE, 3.0))
 
     flexspline = new_entity("flexspline", scene_teeth.FRAME, at)
     toothed = scene_teeth.flexspline_outline(g)
-    angle = np.arctan2(toothed[:, 1], toothed[:, 0])
+    angle = scene_teeth.middles(toothed)
     under = shapes.polar(g.radius(angle) - 0.7 * h, angle)
     flexspline.triangles.append(shapes.prism(toothed, under, -0.10 * r, 0.105 * r, _BRASS))
 

@@ -24,10 +24,10 @@ _VIEWER_FRAMES_PER_SECOND = 30.0
 _MOST_FRAMES = 3600
 _MOST_TURNS = 18_000
 """Of a run: frames at their rate, and those that a fast motor needs besides."""
-_TURN = 2 * np.pi / 36
+_TURN = 2 * np.pi / 24
 """Turn of the motor after which there is another frame."""
-_ROTATION_GRID = 2.0**-25
-"""Halves of angles are rounded to this, less than a hundredth of an arc second, for the size of the log."""
+_ROTATION_GRID = 2.0**-23
+"""Rotations are rounded to this, a twentieth of an arc second, for the size of the log."""
 
 
 def frames_per_second(duration: float) -> float:
@@ -95,7 +95,6 @@ def frame_angles(g: SceneGeometry, state: Table, rows: NDArray[np.intp]) -> dict
     error = next((state[c][rows] for c in ERROR_CHANNELS if c in state), still)
     angles = {
         "circular_spline": spline,
-        "flexspline": (output if ring is None else ring) if g.circular_spline_fixed else still,
         "wave_generator": motor,
         scene_teeth.FRAME: scene_teeth.mesh_angle(g, motor, spline, twist),
         "output": output,

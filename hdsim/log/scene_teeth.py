@@ -78,6 +78,12 @@ def circular_spline_outline(g: SceneGeometry) -> Array:
     return _outline(radius, middle, widths * np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]))
 
 
+def middles(outline: Array) -> Array:
+    """For each point of an outline (6 teeth, 3) the angle of the middle of its tooth: (6 teeth,)."""
+    tips = outline.reshape(-1, 6, 3)[:, 2:4].mean(axis=1)
+    return np.repeat(np.arctan2(tips[:, 1], tips[:, 0]), 6)
+
+
 def force_bars(g: SceneGeometry, angle: Array, force: Array) -> bytes:
     """Teeth that carry load, coloured, with a bar inwards as long as the force: a serialized LinePrimitive.
 
@@ -102,7 +108,7 @@ def force_bars(g: SceneGeometry, angle: Array, force: Array) -> bytes:
     tip = radius + (_TIP - 0.1) * g.tooth_height
     points = np.stack([shapes.polar(foot, place, z), shapes.polar(tip, place, z)], axis=1)
     colours = np.repeat(shapes.force_colours(share), 2, axis=0)
-    return shapes.segments(points.reshape(-1, 3), colours, 1.8 * _half_width(g), in_pixels=False)
+    return shapes.segments(points.reshape(-1, 3), colours, 4.0)
 
 
 def _lag(angle: Array, pitch: float) -> float:

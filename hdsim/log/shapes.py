@@ -57,19 +57,18 @@ def repeated_vectors(number: int, vectors: Array) -> bytes:
     return out.tobytes()
 
 
-def segments(points: Array, colours: Array | Rgba, thickness: float, *, in_pixels: bool = True) -> bytes:
+def segments(points: Array, colours: Array | Rgba, thickness: float) -> bytes:
     """A serialized LinePrimitive of separate segments.
 
     Args:
         points: (2 n, 3), in m; each two are the ends of a segment.
         colours: (2 n, 4), or one for all.
-        thickness: in pixels, or in m.
-        in_pixels: which of the two.
+        thickness: in pixels.
     """
     from foxglove_schemas_protobuf.Color_pb2 import Color
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 
-    line = LinePrimitive(type=LinePrimitive.LINE_LIST, thickness=thickness, scale_invariant=in_pixels)
+    line = LinePrimitive(type=LinePrimitive.LINE_LIST, thickness=thickness, scale_invariant=True)
     line.pose.orientation.w = 1.0
     data = b""
     if isinstance(colours, tuple):

@@ -15,7 +15,10 @@ TOPIC = "/hd/states"
 MESSAGE_TYPE = "hdsim.States"
 _FIELDS = ("flank", "torque", "motor")
 
-_FIRST_RATE_HZ = 1000.0
+_RATE_HZ = 1000.0
+"""Of a log whose view keeps every sample."""
+_REPEATED = 12
+"""Samples after which a state that lasts is said again: viewers draw it up to the last message."""
 _UNLOADED = 1e-3
 """Share of the rated torque below which no flank counts as loaded."""
 _AT_LIMIT = 1 - 1e-9
@@ -35,11 +38,13 @@ class StateFinder:
     def __init__(self, facts: Facts, rate: float) -> None:
         self._facts = facts
         self.fields = _FIELDS if facts.torque_limit_nm > 0 else _FIELDS[:2]
-        self._ticks = Ticks(min(rate, _FIRST_RATE_HZ))
+        self._ticks = Ticks(rate if np.isfinite(rate) else _RATE_HZ)
         self._last: tuple[str, ...] | None = None
+        self._untold = 0
+        self._end = 0.0
 
     def feed(self, time: Array, columns: Mapping[str, Array]) -> tuple[Array, list[bytes]]:
-        """Times (k,) of changes in the next rows, s, and their messages."""
+        """Times (k,) of changes in the next rows, s, and now and then between, and the messages."""
         torque, rated = columns.get("output_torque"), self._facts.rated_torque_nm
         if rated <= 0 or torque is None or torque.ndim != 1 or not len(time):
             return time[:0], []
@@ -60,11 +65,23 @@ class StateFinder:
         times, messages = [], []
         samples = zip(*(f.tolist() for f in found), strict=True)
         for at, words in zip(time[rows].tolist(), samples, strict=True):
-            if words != self._last:
-                self._last = words
+            self._untold += 1
+            if words != self._last or self._untold >= _REPEATED:
+                self._last, self._untold = words, 0
                 times.append(at)
-                messages.append(b"".join(embed(k, w.encode()) for k, w in enumerate(words, start=1)))
+                messages.append(_message(words))
+            self._end = at
         return np.array(times), messages
+
+    def finish(self) -> tuple[Array, list[bytes]]:
+        """The last state once more, so that it is seen to last to the end."""
+        if self._last is None or not self._untold:
+            return np.zeros(0), []
+        return np.array([self._end]), [_message(self._last)]
+
+
+def _message(words: Sequence[str]) -> bytes:
+    return b"".join(embed(k, word.encode()) for k, word in enumerate(words, start=1))
 
 
 def schema(fields: Sequence[str]) -> bytes:

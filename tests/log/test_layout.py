@@ -273,7 +273,9 @@ def test_states_change_where_the_run_does(diagnosed):
         assert state.flank == ("in the gap" if gap else "positive flank" if torque > 0 else "negative flank")
         assert state.torque == "up to rated torque"
         assert state.motor == ("motor at its limit" if abs(motor) >= 0.4 else "motor below its limit")
-    assert len(found) < 30
+    # A state that lasts is said again now and then, and at the end, because viewers draw it up to there.
+    assert found[-1][0] > naming.to_ns(run.time)[-2]
+    assert len(found) < 400
 
 
 @pytest.mark.parametrize(

@@ -44,8 +44,8 @@ def test_the_log_with_a_scene_is_sound_and_reads_back(log):
 def test_frames_come_at_the_rate_that_playback_shows_and_turn_the_bodies(log):
     run = drive_run()
     frames = messages(log, scene.TRANSFORM_TOPIC)
-    # At least 30 for each second of playback, and one for every ten degrees that the motor turns.
-    turned_on = np.abs(np.diff(run["motor_angle"])).sum() / math.radians(10)
+    # At least 30 for each second of playback, and one for every 15 degrees that the motor turns.
+    turned_on = np.abs(np.diff(run["motor_angle"])).sum() / math.radians(15)
     assert 4.0 * 30 / layout.playback_speed(4.0) <= len(frames)
     assert turned_on <= len(frames) < 4.0 * 30 / layout.playback_speed(4.0) + turned_on + 2
     for log_time, frame in frames[:: len(frames) // 7]:
@@ -56,7 +56,6 @@ def test_frames_come_at_the_rate_that_playback_shows_and_turn_the_bodies(log):
         assert {t.timestamp.seconds * 10**9 + t.timestamp.nanos for t in frame.transforms} == {log_time}
         assert same_angle(turned(by_name["wave_generator"]), run["motor_angle"][k])
         assert same_angle(turned(by_name["output"]), run["output_angle"][k])
-        assert same_angle(turned(by_name["flexspline"]), run["ring_angle"][k])
         assert turned(by_name["circular_spline"]) == 0
         factor = float(info_log(log).metadata["hdsim.scene"]["error_factor"])
         pointed = run["output_angle"][k] + factor * run["transmission_error"][k]
@@ -70,7 +69,7 @@ def test_a_motor_that_sleeps_and_sprints_has_frames_when_it_turns():
     rows = np.concatenate(
         [turns.rows(time[k : k + 777], angle[k : k + 777]) + k for k in range(0, 10**5, 777)]
     )
-    assert len(rows) == pytest.approx(90 + 360, abs=12)
+    assert len(rows) == pytest.approx(90 + 240, abs=12)
     assert rows.tolist() == scene_frames.Turns(1.0, 100.0).rows(time, angle).tolist()
     fast = scene_frames.Turns(1.0, 100.0).rows(time, 1e3 * angle)
     assert len(fast) <= 18_000
@@ -244,7 +243,6 @@ def test_geometry_comes_from_the_metadata(tmp_path):
     frames = messages(write_log(run, tmp_path / "a.mcap"), scene.TRANSFORM_TOPIC)
     by_name = {t.child_frame_id: t for t in frames[50][1].transforms}
     assert turned(by_name["circular_spline"]) == turned(by_name["output"]) != 0
-    assert turned(by_name["flexspline"]) == 0
     run.metadata["geometry"] = "[1"
     with pytest.raises(InputError, match="is no drive geometry"):
         scene.geometry_of(run)
