@@ -181,7 +181,7 @@ def tooth_contact(facts: Facts) -> Split:
             column(
                 (34, _profile(facts)),
                 *single,
-                (33, row((70, share), (30, gauge("Engaged now", f"{STATE}.engaged_share", 0, 1)))),
+                (33, row((70, share), (30, gauge("Now", f"{STATE}.engaged_share", 0, 1)))),
             ),
         ),
         (30, column((30, _states()), (35, gaps), (35, _loop()))),

@@ -34,7 +34,9 @@ def static_entities(g: SceneGeometry, at: int, *, with_error: bool, with_measure
     around = np.linspace(0.0, 2 * np.pi, 181)[:-1]
     spline = new_entity("circular spline", "circular_spline", at)
     inner = scene_teeth.circular_spline_outline(g)
-    outer = shapes.polar(1.25 * r, scene_teeth.middles(inner))
+    # Each flank's triangles reach out to the middle of its own tooth, so that none lies over a space.
+    sides = np.tile([-1, -1, -1, 1, 1, 1], g.circular_spline_teeth) * (np.pi / g.circular_spline_teeth)
+    outer = shapes.polar(1.25 * r, scene_teeth.middles(inner) + sides)
     spline.triangles.append(shapes.prism(outer, inner, -0.10 * r, 0.10 * r, _STEEL))
     mark = shapes.polar(np.array([1.12, 1.25]) * r, np.zeros(2), 0.12 * r)
     _add_line(spline, shapes.segments(mark, _WHITE, 3.0))

@@ -121,6 +121,44 @@ def test_flanks_are_as_far_apart_as_the_gap():
         assert play == pytest.approx(4e-6 * 200 / 202, abs=2e-7)
 
 
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def covered(body, points):
+    """Which of the points (n, 2) any triangle of a body covers, as seen along the axis."""
+    corners = np.array([[p.x, p.y] for p in body.points])[np.array(body.indices)].reshape(-1, 3, 2)
+    inside = np.zeros(len(points), bool)
+    for a, b, c in corners:
+        sides = [cross(q - p, points - p) for p, q in ((a, b), (b, c), (c, a))]
+        area = cross(b - a, c - a)
+        inside |= np.all([s * np.sign(area) > 0 for s in sides], axis=0) & (abs(area) > 1e-16)
+    return inside
+
+
+def test_bodies_cover_their_teeth_and_leave_their_spaces_open():
+    g = scene.SceneGeometry(flexspline_teeth=40, circular_spline_teeth=42, half_gap_m=5e-6)
+    entities = {e.id: e for e in scene.static_entities(g, naming.EPOCH_NS, with_error=False)}
+    (spline,), (ring,) = entities["circular spline"].triangles, entities["flexspline"].triangles
+    space = 2 * np.pi / 42 * np.arange(42)
+    depth = g.pitch_radius_m + 0.5 * g.tooth_height
+    half = 0.24 * 2 * np.pi * g.pitch_radius_m / 42
+    for side in (-1, 1):
+        # In the play of a flank, a micrometre wide, and as far behind the flank.
+        free = shapes.polar(depth, space + side * (half + 3e-6) / depth)[:, :2]
+        steel = shapes.polar(depth, space + side * (half + 7e-6) / depth)[:, :2]
+        assert not covered(spline, free).any()
+        assert covered(spline, steel).all()
+    # Where the teeth mesh.
+    slots = 2 * np.pi / 40 * np.array([-3, -2, -1, 0, 1, 2, 3, 18, 19, 20, 21, 22])
+    radius = g.radius(slots) + 0.4 * g.tooth_height
+    for side in (-1, 1):
+        brass = shapes.polar(radius, g.place(slots) + side * (half - 3e-6) / radius)[:, :2]
+        free = shapes.polar(radius, g.place(slots) + side * (half + 3e-6) / radius)[:, :2]
+        assert covered(ring, brass).all()
+        assert not covered(ring, free).any()
+
+
 def test_engaged_teeth_are_coloured_by_their_force(log):
     teeth = drive_run().tables["teeth"]
     g = scene.geometry_of(drive_run())
