@@ -17,7 +17,7 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.log import naming, panels, scene_teeth, schemas, shapes
-from hdsim.log.scene_bodies import new_entity, static_entities
+from hdsim.log.scene_bodies import Shown, new_entity, static_entities
 from hdsim.log.scene_frames import Ticks, Turns, frame_angles, frames_per_second, transform_messages
 from hdsim.log.scene_geometry import (
     ANGLES,
@@ -65,7 +65,7 @@ class SceneWriter:
             raise InputError(f"the scene needs the channel {missing[0]!r} in the state")
         if not self._begun:
             self._begun = True
-            self._write_static(state)
+            self._write_static(state, with_forces="teeth" in tables)
         self._write_transforms(state)
         if "teeth" in tables and len(tables["teeth"]):
             self._write_forces(tables["teeth"])
@@ -100,15 +100,14 @@ class SceneWriter:
             payloads.append(shapes.embed(SceneUpdate.ENTITIES_FIELD_NUMBER, entity))
         self._log.write_messages(panels.SCENE, "foxglove.SceneUpdate", _scene_schema, times, payloads)
 
-    def _write_static(self, state: Table) -> None:
+    def _write_static(self, state: Table, *, with_forces: bool) -> None:
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
         self._log.write_metadata(GEOMETRY_RECORD, {k: repr(v) for k, v in asdict(self._geometry).items()})
         at = int(naming.to_ns(state.time[:1])[0])
         has_error = any(c in state for c in ERROR_CHANNELS)
-        entities = static_entities(
-            self._geometry, at, with_error=has_error, with_measured=MEASURED_OUTPUT in state
-        )
+        shown = Shown(forces=with_forces, error=has_error, measured=MEASURED_OUTPUT in state)
+        entities = static_entities(self._geometry, at, shown)
         update = SceneUpdate(entities=entities)
         self._log.write_messages(
             panels.SCENE_STATIC,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,28 @@ _GHOST: shapes.Rgba = (0.55, 0.80, 1.0, 0.75)
 _TEXT_PX = 13.0
 
 
-def static_entities(g: SceneGeometry, at: int, *, with_error: bool, with_measured: bool = False) -> list[Any]:
+@dataclass(frozen=True)
+class Shown:
+    """What a run has to show besides the drive.
+
+    Args:
+        forces: on its teeth.
+        error: of its output, to point at.
+        measured: a measured machine beside it.
+    """
+
+    forces: bool = True
+    error: bool = True
+    measured: bool = False
+
+
+def static_entities(g: SceneGeometry, at: int, shown: Shown) -> list[Any]:
     """The bodies, each in its own frame, and the legend.
 
     Args:
         g: the drive.
         at: log time in ns.
-        with_error: whether there is an error to point at.
-        with_measured: whether there is a measured machine beside the drive.
+        shown: what there is besides.
     """
     r, h = g.pitch_radius_m, g.tooth_height
     around = np.linspace(0.0, 2 * np.pi, 181)[:-1]
@@ -68,19 +83,19 @@ def static_entities(g: SceneGeometry, at: int, *, with_error: bool, with_measure
     output.spheres.append(_load(1.55 * r * pointing, 0.11 * r, -0.45 * r))
     entities = [spline, flexspline, generator, output]
     pointers = [(output, 1.42, _WHITE, 3.0)]
-    if with_error:
+    if shown.error:
         entities.append(new_entity("error pointer", "error_pointer", at))
         pointers.append((entities[-1], 1.5, _RED, 5.0))
-    if with_measured:
+    if shown.measured:
         entities.append(new_entity("measured pointer", "measured_pointer", at))
         pointers.append((entities[-1], 1.6, _GHOST, 5.0))
     for entity, end, colour, width in pointers:
         needle = shapes.polar(np.array([1.27, end]) * r, np.full(2, g.arm_angle_rad), 0.14 * r)
         _add_line(entity, shapes.segments(needle, colour, width))
-    return [*entities, _legend(g, at, with_error=with_error, with_measured=with_measured)]
+    return [*entities, _legend(g, at, shown)]
 
 
-def _legend(g: SceneGeometry, at: int, *, with_error: bool, with_measured: bool) -> Any:
+def _legend(g: SceneGeometry, at: int, shown: Shown) -> Any:
     r = g.pitch_radius_m
     legend = new_entity("legend", WORLD, at)
 
@@ -88,17 +103,18 @@ def _legend(g: SceneGeometry, at: int, *, with_error: bool, with_measured: bool)
         legend.texts.append(shapes.text(words, (x * r, y * r, 0.2 * r), _TEXT_PX))
 
     words = f"drawn larger: deflection x{g.deflection_factor:g}"
-    if with_error:
+    if shown.error:
         words += f", error of the output x{g.error_factor:g} (red)"
     write(words, 0.0, 1.82)
-    if with_measured:
+    if shown.measured:
         write("pale blue: error of the measured machine", 0.0, -1.82)
-    steps = np.linspace(0.0, 1.0, 16)
-    x = np.repeat(-0.6 + 0.075 * np.arange(16), 2) + np.tile([0.0, 0.075], 16)
-    bar = np.column_stack([x, np.full(32, 1.68), np.full(32, 0.2)]) * r
-    _add_line(legend, shapes.segments(bar, np.repeat(shapes.force_colours(steps), 2, axis=0), 9.0))
-    write("tooth force 0 N", -1.2, 1.68)
-    write(f"{g.largest_force_n:g} N", 0.9, 1.68)
+    if shown.forces:
+        steps = np.linspace(0.0, 1.0, 16)
+        x = np.repeat(-0.6 + 0.075 * np.arange(16), 2) + np.tile([0.0, 0.075], 16)
+        bar = np.column_stack([x, np.full(32, 1.68), np.full(32, 0.2)]) * r
+        _add_line(legend, shapes.segments(bar, np.repeat(shapes.force_colours(steps), 2, axis=0), 9.0))
+        write("tooth force 0 N", -1.2, 1.68)
+        write(f"{g.largest_force_n:g} N", 0.9, 1.68)
     if g.gravity:
         arrow = np.array([[0, 0], [0, -0.45], [0, -0.45], [-0.07, -0.33], [0, -0.45], [0.07, -0.33]])
         points = np.column_stack([arrow + np.array([-1.6, -1.2]), np.full(6, 0.2)]) * r

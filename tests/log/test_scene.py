@@ -18,13 +18,14 @@ from hdsim.log import (
     open_log,
     panels,
     scene,
+    scene_bodies,
     scene_frames,
     scene_teeth,
     shapes,
     verify_log,
     write_log,
 )
-from hdsim.recording import Column, Table
+from hdsim.recording import Column, Recording, Table
 
 
 def same_angle(a, b):
@@ -138,7 +139,7 @@ def covered(body, points):
 
 def test_bodies_cover_their_teeth_and_leave_their_spaces_open():
     g = scene.SceneGeometry(flexspline_teeth=40, circular_spline_teeth=42, half_gap_m=5e-6)
-    entities = {e.id: e for e in scene.static_entities(g, naming.EPOCH_NS, with_error=False)}
+    entities = {e.id: e for e in scene_bodies.static_entities(g, naming.EPOCH_NS, scene_bodies.Shown())}
     (spline,), (ring,) = entities["circular spline"].triangles, entities["flexspline"].triangles
     space = 2 * np.pi / 42 * np.arange(42)
     depth = g.pitch_radius_m + 0.5 * g.tooth_height
@@ -264,6 +265,7 @@ def test_without_tooth_forces_the_teeth_are_drawn_all_the_same(tmp_path):
     path = write_log(run, tmp_path / "a.mcap")
     assert not messages(path, panels.SCENE)
     ((_, update),) = messages(path, panels.SCENE_STATIC)
+    assert not any("tooth force" in t.text for e in update.entities for t in e.texts)
     assert "flexspline_teeth" in {e.frame_id for e in update.entities}
     for _, frame in messages(path, scene.TRANSFORM_TOPIC)[::50]:
         by_name = {t.child_frame_id: turned(t) for t in frame.transforms}
@@ -296,3 +298,21 @@ def test_a_minute_at_a_kilohertz_with_teeth_and_scene_stays_small(tmp_path):
 def test_half_an_hour_is_drawn_in_at_most_3600_frames():
     assert scene_frames.frames_per_second(1800.0) * 1800.0 <= 3600
     assert scene_frames.frames_per_second(0.02) == pytest.approx(3000.0)
+
+
+def test_a_comparison_shows_the_measured_machine_beside_the_model(tmp_path):
+    run = drive_run(duration=1.0)
+    state = run.tables["state"]
+    measured = Table(state.time, {name: state.columns[name] for name in ("motor_angle", "output_angle")})
+    off = Column(state["output_angle"] - 1e-4, "rad")
+    model = {"output_angle": off, "transmission_error": Column(state["transmission_error"] - 1e-4, "rad")}
+    recording = Recording({"measured": measured, "after": Table(state.time, model)})
+    path = write_log(recording, tmp_path / "a.mcap")
+    ((_, update),) = messages(path, panels.SCENE_STATIC)
+    assert "measured_pointer" in {e.frame_id for e in update.entities}
+    factor = float(info_log(path).metadata["hdsim.scene"]["error_factor"])
+    for at, frame in messages(path, scene.TRANSFORM_TOPIC)[::40]:
+        k = int(np.flatnonzero(naming.to_ns(run.time) == at)[0])
+        by_name = {t.child_frame_id: turned(t) for t in frame.transforms}
+        assert same_angle(by_name["output"], off.values[k])
+        assert same_angle(by_name["measured_pointer"] - by_name["error_pointer"], factor * 1e-4)
