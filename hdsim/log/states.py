@@ -17,6 +17,8 @@ _FIELDS = ("flank", "torque", "motor")
 
 _RATE_HZ = 1000.0
 """Of a log whose view keeps every sample."""
+_LEAST = 4
+"""Samples that a state has to last to be told: shorter ones would be labels without a bar."""
 _REPEATED = 12
 """Samples after which a state that lasts is said again: viewers draw it up to the last message."""
 _UNLOADED = 1e-3
@@ -39,7 +41,10 @@ class StateFinder:
         self._facts = facts
         self.fields = _FIELDS if facts.torque_limit_nm > 0 else _FIELDS[:2]
         self._ticks = Ticks(rate if np.isfinite(rate) else _RATE_HZ)
-        self._last: tuple[str, ...] | None = None
+        self._now: tuple[str, ...] | None = None
+        self._told: tuple[str, ...] | None = None
+        self._begun = 0.0
+        self._lasted = 0
         self._untold = 0
         self._end = 0.0
 
@@ -62,22 +67,30 @@ class StateFinder:
                 np.zeros(len(rows), bool) if motor is None else np.abs(motor[rows]) >= _AT_LIMIT * limit
             )
             found.append(np.where(at_limit, "motor at its limit", "motor below its limit"))
-        times, messages = [], []
         samples = zip(*(f.tolist() for f in found), strict=True)
+        times: list[float] = []
+        messages: list[bytes] = []
         for at, words in zip(time[rows].tolist(), samples, strict=True):
+            if words != self._now:
+                # The run begins with the first state that lasts.
+                self._begun = at if self._told is not None or self._now is None else self._begun
+                self._now, self._lasted = words, 0
+            self._lasted += 1
             self._untold += 1
-            if words != self._last or self._untold >= _REPEATED:
-                self._last, self._untold = words, 0
-                times.append(at)
+            new = words != self._told and self._lasted >= _LEAST
+            if new or (words == self._told and self._untold >= _REPEATED):
+                times.append(self._begun if new else at)
                 messages.append(_message(words))
+                self._told, self._untold = words, 0
             self._end = at
         return np.array(times), messages
 
     def finish(self) -> tuple[Array, list[bytes]]:
         """The last state once more, so that it is seen to last to the end."""
-        if self._last is None or not self._untold:
+        words = self._told or self._now
+        if words is None or not self._untold:
             return np.zeros(0), []
-        return np.array([self._end]), [_message(self._last)]
+        return np.array([self._begun if self._told is None else self._end]), [_message(words)]
 
 
 def _message(words: Sequence[str]) -> bytes:
