@@ -17,7 +17,7 @@ _FIELDS = ("flank", "torque", "motor")
 
 _RATE_HZ = 1000.0
 """Of a log whose view keeps every sample."""
-_LEAST = 4
+_LEAST = 9
 """Samples that a state has to last to be told: shorter ones would be labels without a bar."""
 _REPEATED = 12
 """Samples after which a state that lasts is said again: viewers draw it up to the last message."""

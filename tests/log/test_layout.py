@@ -270,7 +270,7 @@ def test_states_change_where_the_run_does(diagnosed):
     wanted = list(zip(np.sign(torque), np.abs(motor) >= 0.4, strict=True))
     for k, at in enumerate(naming.to_ns(run.time).tolist()):
         # What lasts for a few samples only is left out.
-        if k < 6 or len(set(wanted[k - 6 : k + 7])) > 1:
+        if k < 12 or len(set(wanted[k - 12 : k + 13])) > 1:
             continue
         state = next(m for t, m in reversed(found) if t <= at)
         assert state.flank == ("positive flank" if torque[k] > 0 else "negative flank")
