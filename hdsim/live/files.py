@@ -35,7 +35,7 @@ def layouts_of(path: Path, about: LogInfo) -> dict[str, str]:
     attached = {
         name: data.decode() for name, data in read_attachments(path).items() if _LAYOUT.fullmatch(name)
     }
-    found = attached or layouts_of_log(about.fields, about.duration, about.drive_radius)
+    found = attached or layouts_of_log(about.fields, about.duration, about.drive_radius, about.facts)
     return {name.removeprefix("layout-").removesuffix(".json"): text for name, text in found.items()}
 
 

@@ -149,6 +149,6 @@ def layout(name: str | None, log: Path | None) -> None:
 
     about = info_log(log)
     made = layouts.build_layout(
-        name, topics=about.fields, duration=about.duration, drive_radius=about.drive_radius
+        name, topics=about.fields, duration=about.duration, drive_radius=about.drive_radius, facts=about.facts
     )
     click.echo(layouts.to_json(made), nl=False)

@@ -335,6 +335,4 @@ def write_imported(recording: Recording, path: str | Path) -> Path:
     files: dict[str, Any] = {}
     if "mapping" in recording.metadata:
         files["mapping.yaml"] = recording.metadata["mapping"]
-    return write_log(
-        recording, path, attachments=files, scene=recording.metadata.get(naming.ORIGIN_KEY) != naming.MEASURED
-    )
+    return write_log(recording, path, attachments=files)

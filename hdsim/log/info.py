@@ -10,6 +10,7 @@ from mcap.opcode import Opcode
 
 from hdsim.errors import InputError
 from hdsim.log import naming, scan
+from hdsim.log.facts import RECORD, Facts
 from hdsim.log.naming import ColumnSpec
 from hdsim.log.schemas import message_class
 
@@ -50,6 +51,11 @@ class LogInfo:
     def drive_radius(self) -> float:
         """Pitch radius of the drive in m, as the scene says; 0.025 without one."""
         return float(self.metadata.get("hdsim.scene", {}).get("pitch_radius_m", "0.025"))
+
+    @property
+    def facts(self) -> Facts:
+        """What layouts have to know of the run; what is not in the log has its default."""
+        return Facts.read(self.metadata.get(RECORD, {}))
 
     @property
     def duration(self) -> float:

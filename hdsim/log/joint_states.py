@@ -11,7 +11,7 @@ little-endian (https://mcap.dev/spec/registry#cdr); doubles are aligned to 8 byt
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 TOPIC = "/joint_states"
 MESSAGE_TYPE = "sensor_msgs/msg/JointState"
 JOINTS = ("motor", "output")
+_TABLES = ("state", "measured")
 _FRAME = "world"
 _FIELDS = ("angle", "velocity", "torque")
 _MOST_ROWS = 4096
@@ -166,6 +167,33 @@ class JointStateStream(Stream):
         times = np.ascontiguousarray(now.view(self._layout.dtype)[:, 0]["log_time"])
         self._write(self._preamble + now.tobytes(), times, offsets)
         self._waiting, self._rows = ([later] if len(later) else []), len(later)
+
+
+class JointStates:
+    """The joint states of the first table that has joints.
+
+    Args:
+        make: makes their topic, once there is such a table.
+    """
+
+    def __init__(self, make: Callable[[], JointStateStream]) -> None:
+        self._make = make
+        self._table = ""
+        self._stream: JointStateStream | None = None
+
+    def feed(self, table: str, time: Array, columns: Mapping[str, Array]) -> None:
+        """Take the next rows of a table."""
+        if table not in _TABLES or self._table not in ("", table) or not has_joints(list(columns)):
+            return
+        self._table = table
+        if self._stream is None:
+            self._stream = self._make()
+        self._stream.feed(time, columns)
+
+    def flush(self) -> None:
+        """Write what waits."""
+        if self._stream is not None:
+            self._stream.flush()
 
 
 def problem_of(body: bytes) -> str | None:

@@ -9,179 +9,20 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from hdsim.errors import InputError
-from hdsim.log.panels import Panel, Split, column, events, gauge, lamp, plot, row, scene
-
-STATE = "/hd/state_view"
-TEETH = "/hd/teeth"
-MEASURED = "/hd/measured_view"
-LOOP = "/hd/state_loop"
-STATIC = "/hd/static_view"
+from hdsim.log.facts import SPEEDS as SPEEDS
+from hdsim.log.facts import Facts
+from hdsim.log.facts import playback_speed as playback_speed
+from hdsim.log.layout_trees import FIRST, NEEDED, NOT_ATTACHED
+from hdsim.log.layout_trees import LAYOUTS as LAYOUTS
+from hdsim.log.panels import Panel, Split, in_metres
 
 Topics = Mapping[str, Collection[str]]
 """Fields of every topic of a log, by topic."""
-
-_SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-_SHORT_S, _LONG_S = 10.0, 60.0
-_NOW_STYLE = {"color": "#ff3b30", "lineSize": 2.0}
-_CURVE_STYLE = {"color": "#4e98e2", "lineSize": 0.8}
-_AFTER_STYLE, _BEFORE_STYLE, _MEASURED_STYLE = ({"color": c} for c in ("#128a3c", "#f5774d", "#7fa8d8"))
-_CAMERA_DISTANCE = 5.0
-"""Of the camera from the drive, in pitch radii."""
-
-
-def playback_speed(duration: float) -> float:
-    """Speed at which a run of ``duration`` s is pleasant to watch: 10 s to a minute where viewers can.
-
-    Viewers play at 0.01 to 5 times real time.
-    """
-    if duration <= 0:
-        return 1.0
-    if duration < _SHORT_S:
-        return max((s for s in _SPEEDS if duration / s >= _SHORT_S), default=_SPEEDS[0])
-    return min((s for s in _SPEEDS if s >= 1 and duration / s <= _LONG_S), default=_SPEEDS[-1])
-
-
-def _motion() -> Panel:
-    return plot("Output angle [rad]", f"{STATE}.output_angle", f"{STATE}.reference_angle")
-
-
-def _torques() -> Panel:
-    return plot("Torque at the output [N m]", f"{STATE}.output_torque", f"{STATE}.load_torque")
-
-
-def _profile() -> Panel:
-    return plot(
-        "Tooth force now [N] over angle from the major axis [rad]",
-        f"{TEETH}.normal_force[:]",
-        over=f"{TEETH}.angle[:]",
-        dots=True,
-    )
-
-
-def _loop() -> Panel:
-    return plot(
-        "Torque [N m] over twist [arcsec], red: now",
-        f"{LOOP}.output_torque_now[:]",
-        f"{LOOP}.output_torque[:]",
-        over=f"{LOOP}.twist_arcsec[:]",
-        legend=False,
-        styles=(_NOW_STYLE, _CURVE_STYLE),
-    )
-
-
-def _contact_lamp() -> Panel:
-    return lamp("Contact", f"{STATE}.engaged_share", 0.005, "IN THE GAP", "IN CONTACT")
-
-
-def overview() -> Split:
-    """The drive turning, where it should be, how far off it is, and what loads it."""
-    errors = plot("Error [arcsec]", f"{STATE}.tracking_error_arcsec", f"{STATE}.transmission_error_arcsec")
-    small = row((50, gauge("Engaged share", f"{STATE}.engaged_share", 0, 1)), (50, _contact_lamp()))
-    return row(
-        (40, column((60, scene()), (15, small), (25, events()))),
-        (30, column((33, _motion()), (33, errors), (34, _torques()))),
-        (
-            30,
-            column(
-                (33, plot("Motor torque [N m]", f"{STATE}.motor_torque", f"{STATE}.input_friction_torque")),
-                (33, _profile()),
-                (34, _loop()),
-            ),
-        ),
-    )
-
-
-def positioning_error() -> Split:
-    """Where the error of the output comes from."""
-    return row(
-        (
-            35,
-            column(
-                (34, plot("Transmission error [arcsec]", f"{STATE}.transmission_error_arcsec")),
-                (33, plot("Tracking error [arcsec]", f"{STATE}.tracking_error_arcsec")),
-                (33, plot("Kinematic error [arcsec]", f"{STATE}.kinematic_error_arcsec")),
-            ),
-        ),
-        (35, column((34, plot("Twist [arcsec]", f"{STATE}.twist_arcsec")), (33, _torques()), (33, _loop()))),
-        (30, column((55, scene()), (25, _motion()), (20, events()))),
-    )
-
-
-def tooth_contact() -> Split:
-    """Which teeth carry the load."""
-    some = [f"{TEETH}.normal_force[{tooth}]" for tooth in (0, 5, 10)]
-    return row(
-        (45, column((70, scene()), (30, _profile()))),
-        (
-            55,
-            column(
-                (30, plot("Force of three teeth over time [N]", *some)),
-                (25, plot("Engaged share", f"{STATE}.engaged_share")),
-                (
-                    25,
-                    plot(
-                        "Half-gap of each tooth [um]",
-                        f"{STATIC}.tooth_half_gap_um[:]",
-                        over="index",
-                        dots=True,
-                    ),
-                ),
-                (20, row((60, _loop()), (40, _contact_lamp()))),
-            ),
-        ),
-    )
-
-
-def diagnose() -> Split:
-    """A measured run, and the model before and after an effect was added to it."""
-
-    def three(title: str, channel: str) -> Panel:
-        # What was measured lies lowest: with its noise it would hide the others.
-        paths = [f"/hd/{run}_view.{channel}" for run in ("after", "before", "measured")]
-        return plot(title, *paths, styles=(_AFTER_STYLE, _BEFORE_STYLE, _MEASURED_STYLE))
-
-    def left(title: str, channel: str) -> Panel:
-        paths = [f"/hd/{run}_view.{channel}" for run in ("after", "before")]
-        return plot(title, *paths, styles=(_AFTER_STYLE, _BEFORE_STYLE))
-
-    return row(
-        (
-            50,
-            column(
-                (34, three("Transmission error [arcsec]", "transmission_error_arcsec")),
-                (33, three("Output torque [N m]", "output_torque")),
-                (33, three("Motor torque [N m]", "motor_torque")),
-            ),
-        ),
-        (
-            50,
-            column(
-                (22, left("Measured less model: output angle [arcsec]", "output_angle_error_arcsec")),
-                (22, left("Measured less model: output torque [N m]", "output_torque_error")),
-                (22, left("Measured less model: motor torque [N m]", "motor_torque_error")),
-                (17, three("Output angle [rad]", "output_angle")),
-                (17, three("Motor velocity [rad/s]", "motor_velocity")),
-                (17, events()),
-            ),
-        ),
-    )
-
-
-LAYOUTS: dict[str, Callable[[], Split]] = {
-    "overview": overview,
-    "positioning-error": positioning_error,
-    "tooth-contact": tooth_contact,
-    "diagnose": diagnose,
-}
-
-
-NEEDED = {"tooth-contact": TEETH}
-"""Topics without which a layout has nothing of its own to show."""
 
 
 def split_path(path: str) -> tuple[str, str]:
@@ -191,7 +32,12 @@ def split_path(path: str) -> tuple[str, str]:
 
 
 def build_layout(
-    name: str, *, topics: Topics | None = None, duration: float | None = None, drive_radius: float = 0.025
+    name: str,
+    *,
+    topics: Topics | None = None,
+    duration: float | None = None,
+    drive_radius: float = 0.025,
+    facts: Facts | None = None,
 ) -> dict[str, Any]:
     """A layout as the viewer imports it.
 
@@ -200,35 +46,45 @@ def build_layout(
         topics: what a log has; lines and panels that it cannot fill are left out. None keeps all.
         duration: length of the run in s, for the playback speed.
         drive_radius: pitch radius in m, for the distance of the camera.
+        facts: what else the layout is fitted to.
 
     Raises:
         InputError: an unknown name, or a log that has nothing to show in this layout.
     """
     try:
-        tree: Panel | Split | None = LAYOUTS[name]()
+        tree: Panel | Split | None = LAYOUTS[name](facts or Facts())
     except KeyError:
         raise InputError(f"no layout {name!r}; there are: {', '.join(LAYOUTS)}") from None
     if topics is not None:
-        if STATE not in topics and MEASURED in topics:
+        if "/hd/state_view" not in topics and "/hd/measured_view" in topics:
             tree = _of_measured(tree)
-        tree = _prune(tree, topics) if NEEDED.get(name) in (None, *topics) else None
-    if tree is None or all(panel.kind == "RosOut" for panel in _panels(tree)):
+        needed = NEEDED.get(name, ())
+        fits = not needed or any(_has(path, topics) for path in needed)
+        tree = _prune(tree, topics) if fits else None
+    if tree is None or all(panel.kind in ("RosOut", "Parameters") for panel in _panels(tree)):
         raise InputError(f"the log has no topic that layout {name!r} shows")
+    facts = facts or Facts()
+    turning = any(panel.kind == "3D" for panel in _panels(tree))
+    speed = playback_speed(duration or 0.0, facts.motor_speed_rad_per_s if turning else 0.0)
     return {
         "configById": {p.id: _settings(p, drive_radius) for p in _panels(tree)},
         "globalVariables": {},
         "userNodes": {},
-        "playbackConfig": {"speed": playback_speed(duration) if duration is not None else 1.0},
+        "playbackConfig": {"speed": speed},
         "layout": _nest(tree),
     }
 
 
-def layouts_of_log(topics: Topics, duration: float, drive_radius: float = 0.025) -> dict[str, str]:
-    """All layouts that have something to show in a log, by file name, as JSON."""
+def layouts_of_log(
+    topics: Topics, duration: float, drive_radius: float = 0.025, facts: Facts | None = None
+) -> dict[str, str]:
+    """Layouts that have something to show in a log, by file name, as JSON; what it was for comes first."""
     found = {}
-    for name in LAYOUTS:
+    for name in (*FIRST, *(name for name in LAYOUTS if name not in (*FIRST, *NOT_ATTACHED))):
         try:
-            layout = build_layout(name, topics=topics, duration=duration, drive_radius=drive_radius)
+            layout = build_layout(
+                name, topics=topics, duration=duration, drive_radius=drive_radius, facts=facts
+            )
         except InputError:
             continue
         found[f"layout-{name}.json"] = to_json(layout)
@@ -241,9 +97,7 @@ def to_json(layout: Mapping[str, Any]) -> str:
 
 
 def _settings(panel: Panel, drive_radius: float) -> dict[str, Any]:
-    settings = dict(panel.settings)
-    if panel.kind == "3D":
-        settings["cameraState"] = {**settings["cameraState"], "distance": _CAMERA_DISTANCE * drive_radius}
+    settings = in_metres(panel.settings, drive_radius) if panel.kind == "3D" else dict(panel.settings)
     return {**settings, "foxglovePanelTitle": panel.title, "lichtblickPanelTitle": panel.title}
 
 
@@ -298,14 +152,22 @@ def _prune(tree: Panel | Split | None, topics: Topics) -> Panel | Split | None:
         return Split(tree.direction, parts) if parts else None
     if tree is None or not tree.paths:
         return tree
-    present = [path for path in tree.paths if _has(path, topics)]
-    if tree.kind != "Plot":
-        return tree if present else None
-    lines = [line for line in tree.settings["paths"] if _has(line["value"], topics)]
-    x_path = tree.settings.get("xAxisPath")
-    if not lines or (x_path and not _has(x_path["value"], topics)):
+    present = tuple(path for path in tree.paths if _has(path, topics))
+    if not present:
         return None
-    return Panel(tree.kind, tree.title, {**tree.settings, "paths": lines}, tuple(present))
+    settings = dict(tree.settings)
+    if tree.kind == "3D":
+        settings["topics"] = {topic: settings["topics"][topic] for topic in present}
+    elif tree.kind in ("Plot", "StateTransitions"):
+        lines = [line for line in settings["paths"] if not line["value"].startswith("/")]
+        shown = [line for line in settings["paths"] if _has(line["value"], topics)]
+        x_path = settings.get("xAxisPath")
+        if not shown or (x_path and not _has(x_path["value"], topics)):
+            return None
+        settings["paths"] = shown + lines
+        if len(shown + lines) == 1:
+            settings["legendDisplay"] = "none"
+    return Panel(tree.kind, tree.title, settings, present)
 
 
 def main(folder: str) -> None:

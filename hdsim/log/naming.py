@@ -31,7 +31,7 @@ STATIC_TOPIC = "/hd/static"
 EVENT_TOPIC = "/hd/events"
 VIEW_SUFFIX = "_view"
 LOOP_SUFFIX = "_loop"
-VIEWED_TABLES = ("state", "measured", "before", "after")
+VIEWED_TABLES = ("state", "measured", "before", "refit", "after")
 """Tables that viewers plot: runs, alone or held against each other."""
 ORIGIN_KEY = "recorded"
 MEASURED = "measured"
@@ -46,6 +46,7 @@ TABLE_RECORD = "hdsim.table."
 
 RESERVED_TABLES = frozenset(
     {"static", "static_view", "events", "scene", "scene_static", "transforms"}
+    | {"states", "orders", "over_angle"}
     | {table + suffix for table in VIEWED_TABLES for suffix in (VIEW_SUFFIX, LOOP_SUFFIX)}
 )
 

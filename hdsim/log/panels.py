@@ -11,8 +11,10 @@ EVENTS = "/hd/events"
 SCENE = "/hd/scene"
 SCENE_STATIC = "/hd/scene_static"
 
-_LEGEND_MARGIN_PX, _LETTER_PX = 80, 10
-"""Width of a legend: more than its text takes, because the viewer narrows it in favour of the plot."""
+_LEGEND_MARGIN_PX, _LETTER_PX = 62, 8.5
+"""Width of a legend: what stands beside a label, and a letter of it."""
+_DASHED = "#9aa4b2"
+_SHORTER = {"input_friction": "friction"}
 
 
 @dataclass(frozen=True)
@@ -52,13 +54,29 @@ def plot(
     title: str,
     *paths: str,
     over: str | None = None,
+    x_label: str = "time [s]",
     dots: bool = False,
     legend: bool = True,
     styles: Sequence[Mapping[str, Any]] = (),
+    dashed: Mapping[str, float] | None = None,
+    low: float | None = None,
+    high: float | None = None,
 ) -> Panel:
     """Values over time; with ``over``, arrays over another of the message, or over ``index``.
 
-    Viewers draw the first line over the second, and so on; ``styles`` are color and lineSize of each.
+    Viewers draw the first line over the second, and so on.
+
+    Args:
+        title: what is plotted, with its unit in square brackets at the end, which labels the axis.
+        paths: what to plot.
+        over: the array that it is plotted over.
+        x_label: of the axis below.
+        dots: points instead of lines.
+        legend: whether to show one, if there is more than one line.
+        styles: color and lineSize of each line.
+        dashed: level lines, by their names.
+        low: lower end of the axis; else as the data ask.
+        high: upper end.
     """
     labels = _labels(paths)
     lines = [
@@ -72,17 +90,30 @@ def plot(
         }
         for path, label, style in zip(paths, labels, styles or [{}] * len(paths), strict=True)
     ]
+    for label, level in (dashed or {}).items():
+        lines.append(
+            {
+                "value": f"{level:.6g}",
+                "enabled": True,
+                "timestampMethod": "receiveTime",
+                "label": label,
+                "color": _DASHED,
+            }
+        )
     settings: dict[str, Any] = {
         "paths": lines,
         "showLegend": True,
-        "legendDisplay": "left" if legend and len(paths) > 1 else "none",
+        "legendDisplay": "left" if legend and len(lines) > 1 else "none",
         "showPlotValuesInLegend": False,
         "showXAxisLabels": True,
         "showYAxisLabels": True,
+        "xAxisLabel": x_label,
+        "yAxisLabel": title[title.rindex("[") :] if title.endswith("]") else "",
         "isSynced": over is None,
         "xAxisVal": "timestamp" if over is None else "index" if over == "index" else "currentCustom",
-        "sidebarDimension": _LEGEND_MARGIN_PX + _LETTER_PX * max(map(len, labels)),
+        "sidebarDimension": round(_LEGEND_MARGIN_PX + _LETTER_PX * max(len(line["label"]) for line in lines)),
     }
+    settings |= {k: v for k, v in (("minYValue", low), ("maxYValue", high)) if v is not None}
     drawn = paths
     if over not in (None, "index"):
         settings["xAxisPath"] = {"value": over, "enabled": True}
@@ -101,25 +132,37 @@ def _labels(paths: tuple[str, ...]) -> list[str]:
         return [f"no. {index.removesuffix(']')}" for *_, index in found]
     # The title names the quantity: of motor_torque and load_torque motor and load are left.
     last = {name.rpartition("_")[2] for name in names}
-    return [name.rpartition("_")[0] if len(paths) > 1 and len(last) == 1 else name for name in names]
+    short = [name.rpartition("_")[0] if len(paths) > 1 and len(last) == 1 else name for name in names]
+    return [_SHORTER.get(name, name) for name in short]
 
 
 def scene(title: str = "Drive") -> Panel:
     """The three-dimensional scene, seen along the axis."""
+    return _three_d(title, "world", 3.8, (0.0, 0.0), 0.0)
+
+
+def mesh(title: str = "Mesh, seen from the wave generator") -> Panel:
+    """One end of the major axis, from near, as the wave generator sees it: the teeth roll through."""
+    return _three_d(title, "wave_generator", 0.62, (0.93, 0.0), 90.0)
+
+
+def _three_d(title: str, frame: str, height: float, middle: tuple[float, float], turned_deg: float) -> Panel:
+    """A view along the axis; lengths are in pitch radii until `in_metres`."""
     settings = {
         "cameraState": {
             "perspective": False,
             "phi": 0,
-            "thetaOffset": 0,
-            "targetOffset": [0, 0, 0],
+            "thetaOffset": turned_deg,
+            "targetOffset": [*middle, 0],
             "target": [0, 0, 0],
             "targetOrientation": [0, 0, 0, 1],
+            "distance": height,
             "fovy": 45,
             "near": 0.001,
             "far": 10,
         },
-        "followMode": "follow-none",
-        "followTf": "world",
+        "followMode": "follow-pose" if frame != "world" else "follow-none",
+        "followTf": frame,
         "scene": {
             "backgroundColor": "#111318",
             "transforms": {"axisScale": 0, "showLabel": False, "visible": False},
@@ -133,30 +176,51 @@ def scene(title: str = "Drive") -> Panel:
     return Panel("3D", title, settings, (SCENE, SCENE_STATIC))
 
 
+def in_metres(settings: Mapping[str, Any], radius: float) -> dict[str, Any]:
+    """Settings of a scene for a drive of a pitch radius in m."""
+    camera = dict(settings["cameraState"])
+    camera["distance"] = camera["distance"] * radius
+    camera["targetOffset"] = [x * radius for x in camera["targetOffset"]]
+    return {**settings, "cameraState": camera}
+
+
 def gauge(title: str, path: str, low: float, high: float) -> Panel:
-    """One number as a needle."""
+    """One number as a needle, in colours that praise and blame nothing."""
     settings = {
         "path": path,
         "minValue": low,
         "maxValue": high,
-        "colorMap": "red-yellow-green",
-        "colorMode": "colormap",
-        "gradient": ["#0000ff", "#ff00ff"],
+        "colorMap": "turbo",
+        "colorMode": "gradient",
+        "gradient": ["#2b4a78", "#7fb2e6"],
         "reverse": False,
     }
     return Panel("Gauge", title, settings, (path,))
 
 
-def lamp(title: str, path: str, below: float, text: str, otherwise: str) -> Panel:
-    """A field that turns red with ``text`` while a number is below a limit."""
+def words(title: str, text: str, path: str) -> Panel:
+    """A few words; a field of the log is named because viewers ask for one."""
     settings = {
         "path": path,
         "style": "background",
-        "fallbackColor": "#339933",
-        "fallbackLabel": otherwise,
-        "rules": [{"operator": "<", "rawValue": str(below), "color": "#ee2222", "label": text}],
+        "fallbackColor": "#2b4a78",
+        "fallbackLabel": text,
+        "rules": [],
     }
     return Panel("Indicator", title, settings, (path,))
+
+
+def transitions(title: str, *paths: str) -> Panel:
+    """What texts change to, and when."""
+    lines = [
+        {"value": path, "label": path.rpartition(".")[2], "timestampMethod": "receiveTime"} for path in paths
+    ]
+    return Panel("StateTransitions", title, {"isSynced": True, "paths": lines, "showPoints": False}, paths)
+
+
+def parameters(title: str = "Parameters") -> Panel:
+    """What can be set while a run is watched live."""
+    return Panel("Parameters", title, {})
 
 
 def events(title: str = "Events") -> Panel:

@@ -16,6 +16,8 @@ Rgba = tuple[float, float, float, float]
 _LENGTH_DELIMITED = 2
 _GRID_M = 2.0**-21
 """Coordinates are rounded to half a micrometre: nobody sees it, and the log is a third of the size."""
+_FINE_GRID_M = 2.0**-24
+"""Of bodies that are drawn once, whose flanks one looks at from near."""
 
 _FORCE_COLOURS: Array = np.array(
     [
@@ -103,7 +105,7 @@ def prism(outer: Array, inner: Array | None, bottom: float, top: float, colour: 
         np.column_stack([ring, np.full(n, z)])
         for ring, z in ((outer[:, :2], top), (hole, top), (outer[:, :2], bottom), (hole, bottom))
     ]
-    points = np.round(np.concatenate(rings) / _GRID_M) * _GRID_M
+    points = np.round(np.concatenate(rings) / _FINE_GRID_M) * _FINE_GRID_M
     here, there = np.arange(n), (np.arange(n) + 1) % n
     out_top, in_top, out_low, in_low = (k * n for k in range(4))
 
@@ -124,12 +126,13 @@ def prism(outer: Array, inner: Array | None, bottom: float, top: float, colour: 
 
 
 def text(content: str, at: Sequence[float], size: float, colour: Rgba = (1.0, 1.0, 1.0, 1.0)) -> Any:
-    """A TextPrimitive that faces the viewer; ``size`` in m."""
+    """A TextPrimitive that faces the viewer; ``size`` in pixels, however near one looks."""
     from foxglove_schemas_protobuf.Color_pb2 import Color
     from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
 
     primitive = TextPrimitive(
         billboard=True,
+        scale_invariant=True,
         font_size=size,
         color=Color(r=colour[0], g=colour[1], b=colour[2], a=colour[3]),
         text=content,
@@ -138,10 +141,3 @@ def text(content: str, at: Sequence[float], size: float, colour: Rgba = (1.0, 1.
     p.position.x, p.position.y, p.position.z = at
     p.orientation.w = 1.0
     return primitive
-
-
-def toothed(radius: float, height: float, teeth: int) -> Array:
-    """Outline (4 teeth, 3) of a gear with ``teeth`` trapezoidal teeth from ``radius`` outwards."""
-    pitch = 2 * np.pi / teeth
-    angle = (np.arange(teeth)[:, None] * pitch + pitch * np.array([-0.35, -0.15, 0.15, 0.35])).ravel()
-    return polar(np.tile([radius, radius + height, radius + height, radius], teeth), angle)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,8 +13,9 @@ import numpy as np
 from hdsim.errors import InputError
 from hdsim.log import naming
 from hdsim.log.container import Container, Watch, opened
+from hdsim.log.digest import Digest
 from hdsim.log.events import event_message
-from hdsim.log.joint_states import MESSAGE_TYPE, JointStateStream, has_joints
+from hdsim.log.joint_states import MESSAGE_TYPE, JointStates, JointStateStream
 from hdsim.log.ordering import order_log
 from hdsim.log.streams import MessageStream, TableStream
 from hdsim.log.view import DEFAULT_VIEW_RATE_HZ, MinMaxView
@@ -21,11 +23,10 @@ from hdsim.log.viewing import LoopStream, ViewStream, display_columns, scaled
 from hdsim.recording import Event, Table
 
 if TYPE_CHECKING:
+    from hdsim.log.facts import Facts
     from hdsim.recording import Column
 
     Array = naming.Array
-
-_JOINT_TABLES = ("state", "measured")
 
 
 class LogWriter:
@@ -75,12 +76,12 @@ class LogWriter:
         self._views: dict[str, ViewStream] = {}
         self._topics: dict[str, list[str]] = {}
         self._layouts = layouts
+        self._digest = Digest(self, metadata, view_rate_hz)
         self.drive_radius = 0.025
         self._channels = 0
         self._tables: dict[str, TableStream] = {}
         self._messages: dict[str, MessageStream] = {}
-        self._joints: JointStateStream | None = None
-        self._joint_table = ""
+        self._joints = JointStates(self._joint_stream)
         self._schemas: dict[str, int] = {}
         self._last_event_ns = 0
         self._open = True
@@ -125,19 +126,26 @@ class LogWriter:
         stream = self._add_table("static", naming.STATIC_TOPIC, flat, specs, time=False)
         stream.append(None, np.array([naming.EPOCH_NS]), row)
         stream.flush()
-        extra = display_columns(flat)
-        if extra:
-            topic = naming.STATIC_TOPIC + naming.VIEW_SUFFIX
-            shown = self._stream(
-                topic,
-                "hdsim.StaticView",
-                [c for _, _, c in extra],
-                {"view_of": naming.STATIC_TOPIC},
-                time=False,
-            )
-            arrays = [scaled(row[index], factor) for index, factor, _ in extra]
-            shown.append(None, np.array([naming.EPOCH_NS]), arrays)
-            shown.flush()
+        self._write_once(
+            naming.STATIC_TOPIC + naming.VIEW_SUFFIX,
+            "hdsim.StaticView",
+            {about: scaled(row[index], factor) for index, factor, about in display_columns(flat)},
+        )
+
+    def write_arrays(self, topic: str, arrays: Mapping[tuple[str, str], Array]) -> None:
+        """Write arrays (n,) for viewers, by name and unit, as one message at time zero of its own topic."""
+        columns = {
+            naming.ColumnSpec(name, name, unit, "", values.shape): values.reshape(1, -1)
+            for (name, unit), values in arrays.items()
+        }
+        self._write_once(naming.PREFIX + topic, naming.message_type_of(topic), columns)
+
+    def _write_once(self, topic: str, message_type: str, columns: Mapping[naming.ColumnSpec, Array]) -> None:
+        if columns:
+            about = {"view_of": topic.removesuffix(naming.VIEW_SUFFIX)}
+            stream = self._stream(topic, message_type, list(columns), about, time=False)
+            stream.append(None, np.array([naming.EPOCH_NS]), list(columns.values()))
+            stream.flush()
 
     def write(self, name: str, block: Table) -> None:
         """Write the next rows of a table.
@@ -151,13 +159,11 @@ class LogWriter:
         """
         time = np.asarray(block.time, np.float64)
         specs = naming.describe_columns(block.columns, rows=True)
-        stream = self._tables.get(name)
-        if stream is None:
-            stream = self._add_table(name, naming.topic_of(name), specs, specs)
+        stream = self._tables.get(name) or self._add_table(name, naming.topic_of(name), specs, specs)
         columns = [np.asarray(c.values, np.float64) for c in block.columns.values()]
         stream.check(name, time, specs, columns)
+        self._digest.feed(name, time, dict(zip(block.columns, columns, strict=True)))
         log_times = naming.to_ns(time)
-        with_joints = name in _JOINT_TABLES and has_joints(list(block.columns))
         # The view is fed chunk by chunk, so that the file doesn't depend on how the run was cut in blocks.
         begin = 0
         while begin < len(time):
@@ -167,21 +173,10 @@ class LogWriter:
             full = stream.append(time[rows], log_times[rows], piece)
             if name in self._views:
                 self._views[name].feed(time[rows], piece)
-            if with_joints:
-                self._write_joints(name, time[rows], dict(zip(block.columns, piece, strict=True)))
+            self._joints.feed(name, time[rows], dict(zip(block.columns, piece, strict=True)))
             if full:
                 self._flush_messages()
             begin = end
-
-    def _write_joints(self, table: str, time: Array, columns: Mapping[str, Array]) -> None:
-        """Joint states of a table, unless another one has that topic already."""
-        if self._joints is None:
-            schema_id = self._schemas.setdefault(MESSAGE_TYPE, len(self._schemas) + 1)
-            channel = self._next_channel()
-            self._joints = JointStateStream(self._container, channel, schema_id, self._view_rate)
-            self._joint_table = table
-        if self._joint_table == table:
-            self._joints.feed(time, columns)
 
     def write_event(self, event: Event) -> None:
         """Write an event; it reaches the disk with the next chunk.
@@ -206,6 +201,8 @@ class LogWriter:
         schema: Any,
         log_times: Iterable[int],
         payloads: Iterable[bytes],
+        *,
+        fields: Sequence[str] = (),
     ) -> None:
         """Write ready protobuf messages to a topic of their own, for what is no table: scenes, transforms.
 
@@ -215,6 +212,7 @@ class LogWriter:
             schema: function that returns the serialized FileDescriptorSet; called once a topic.
             log_times: ns since 1970, not decreasing.
             payloads: one serialized message each.
+            fields: of the message, as far as layouts show them.
         """
         self._check_open()
         stream = self._messages.get(topic)
@@ -224,6 +222,7 @@ class LogWriter:
                 self._container, self._next_channel(), topic, schema_id, message_type, schema()
             )
             self._messages[topic] = stream
+            self._topics[topic] = list(fields)
         for log_time, payload in zip(log_times, payloads, strict=True):
             stream.append(log_time, payload)
 
@@ -238,8 +237,7 @@ class LogWriter:
             stream.flush()
         for view in self._views.values():
             view.flush()
-        if self._joints is not None:
-            self._joints.flush()
+        self._joints.flush()
         self._flush_messages()
         self._container.flush()
 
@@ -277,11 +275,7 @@ class LogWriter:
         text = naming.columns_to_json(described)
         self._container.metadata(naming.TABLE_RECORD + name, {"topic": topic, "columns": text})
 
-        def make(
-            topic: str, kind: str, fields: Sequence[naming.ColumnSpec], about: dict[str, str]
-        ) -> TableStream:
-            return self._stream(topic, kind, fields, about, time=time)
-
+        make = partial(self._stream, time=time)
         message_type = naming.message_type_of(name)
         self._tables[name] = stream = make(topic, message_type, layout, {"columns": text})
         if name in naming.VIEWED_TABLES:
@@ -310,14 +304,18 @@ class LogWriter:
             self._container, self._next_channel(), topic, schema_id, message_type, fields, about, time=time
         )
 
-    def _attach_layouts(self) -> None:
+    def _joint_stream(self) -> JointStateStream:
+        schema_id = self._schemas.setdefault(MESSAGE_TYPE, len(self._schemas) + 1)
+        return JointStateStream(self._container, self._next_channel(), schema_id, self._view_rate)
+
+    def _attach_layouts(self, facts: Facts) -> None:
         """Layouts come last: what they can show is known only then, and `hdsim layout` makes them again."""
         from hdsim.log.layout import layouts_of_log
 
         if not self._layouts:
             return
         topics = {topic: self._topics.get(topic, []) for topic in self._container.topics}
-        for name, text in layouts_of_log(topics, self._container.duration, self.drive_radius).items():
+        for name, text in layouts_of_log(topics, self._container.duration, self.drive_radius, facts).items():
             self._container.attachment(name, "application/json", text.encode(), naming.EPOCH_NS)
 
     def _flush_messages(self) -> None:
@@ -329,21 +327,21 @@ class LogWriter:
             ends = [s.last_time for s in self._tables.values() if s.last_time is not None]
             text = f"run incomplete: {incomplete}"
             self.write_event(Event(max(ends, default=0.0), "error", "hdsim.log", text))
-        self._open = False
         try:
+            facts = self._digest.finish()
             for stream in self._tables.values():
                 stream.flush()
             for view in self._views.values():
                 view.finish()
-            if self._joints is not None:
-                self._joints.flush()
+            self._joints.flush()
             self._flush_messages()
-            self._attach_layouts()
+            self._attach_layouts(facts)
             if statistics:
                 self._container.metadata(naming.STATISTICS_RECORD, statistics)
             if incomplete is not None:
                 self._container.metadata(naming.INCOMPLETE_RECORD, {"reason": incomplete})
             self._container.finish()
         finally:
+            self._open = False
             self._file.close()
         order_log(self.partial, self.path, self._compression)

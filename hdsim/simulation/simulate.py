@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
 import time
 from collections.abc import Callable, Sequence
@@ -10,6 +11,8 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
 
 from hdsim.simulation.run import Run, RunFailed
 from hdsim.simulation.setup import build_run
@@ -43,7 +46,7 @@ def simulate(
     run = build_run(scenario)
     started = time.perf_counter()
     recording = run.record(on_time)
-    recording.metadata.update(provenance(scenario))
+    recording.metadata.update(provenance(scenario) | _for_replay(run))
     recording.metadata.update(summary(run, time.perf_counter() - started))
     if run.interrupted is not None:
         raise run.interrupted
@@ -93,13 +96,13 @@ def simulate_to_log(
     """
     from hdsim.log import LogWriter
     from hdsim.log.scene import SceneWriter
-    from hdsim.log.scene_geometry import SceneGeometry
+    from hdsim.log.scene_geometry import SceneGeometry, rounded_up
     from hdsim.log.view import view_rate
 
     run = build_run(scenario)
     started = time.perf_counter()
     static = run.static()
-    metadata = provenance(scenario)
+    metadata = provenance(scenario) | _for_replay(run)
     with LogWriter(
         path,
         metadata=metadata,
@@ -115,7 +118,12 @@ def simulate_to_log(
             geometry = SceneGeometry.from_metadata(metadata)
             if run.model.teeth is not None:
                 # The colours reach to twice the mean tooth force at rated torque.
-                geometry = replace(geometry, largest_force_n=2 * run.model.teeth.rated_tooth_force_n)
+                teeth = run.model.teeth
+                geometry = replace(
+                    geometry,
+                    largest_force_n=rounded_up(2 * teeth.rated_tooth_force_n),
+                    half_gap_m=float(np.mean(teeth.half_gaps_m)) * teeth.radius_m / teeth.lever_m,
+                )
             scene = SceneWriter(log, geometry, scenario.run.duration_s)
         if static:
             log.write_static(static)
@@ -154,19 +162,33 @@ def provenance(scenario: Scenario) -> dict[str, str]:
         "platform": platform.platform(),
     }
     geometry = scenario.drive.geometry
-    found["geometry"] = json.dumps(
-        {
-            "flexspline_teeth": geometry.flexspline_teeth,
-            "circular_spline_teeth": geometry.circular_spline_teeth,
-            "pitch_radius_m": geometry.pitch_radius_m,
-            "circular_spline_fixed": scenario.drive.arrangement == "circular_spline_fixed",
-        }
-    )
+    drawn: dict[str, float] = {
+        "flexspline_teeth": geometry.flexspline_teeth,
+        "circular_spline_teeth": geometry.circular_spline_teeth,
+        "pitch_radius_m": geometry.pitch_radius_m,
+        "circular_spline_fixed": scenario.drive.arrangement == "circular_spline_fixed",
+    }
+    gravity = scenario.load.gravity
+    if gravity is not None:
+        # Where it hangs, the arm points down.
+        drawn |= {"gravity": True, "arm_angle_rad": -math.pi / 2 - math.radians(gravity.hanging_angle_deg)}
+    found["geometry"] = json.dumps(drawn)
     found |= {f"version_{name}": version(name) for name in _PACKAGES}
     git = _git_state()
     if git:
         found["git"] = git
     return found
+
+
+def _for_replay(run: Run) -> dict[str, str]:
+    """What layouts know of a run before it begins: the torques that its lines are held against."""
+    from hdsim.simulation.events import torque_limit
+
+    limit = torque_limit(run.model)
+    facts = {"rated_torque_nm": run.model.rated_torque_nm}
+    if math.isfinite(limit):
+        facts["torque_limit_nm"] = limit
+    return {"replay": json.dumps(facts)}
 
 
 def summary(run: Run, seconds: float) -> dict[str, str]:

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdsim.estimate.records import CHANNELS
-from hdsim.recording import Column, Recording, Table
+from hdsim.recording import Column, Event, Recording, Table
 
 if TYPE_CHECKING:
     from hdsim.diagnose.workflow import Diagnosis
 
 
 LOG, LAYOUT = "compared.mcap", "diagnose.json"
+_SHORT = {
+    "nothing": "nothing is missing",
+    "parameter": "a number of the model is off",
+    "effect": "an effect is missing",
+    "unknown": "something is missing",
+}
 
 
 def write_compared(diagnosis: Diagnosis, folder: Path) -> None:
@@ -23,7 +30,13 @@ def write_compared(diagnosis: Diagnosis, folder: Path) -> None:
     from hdsim.log.layout import build_layout, to_json
 
     about = info_log(side_by_side(diagnosis).save(folder / LOG))
-    layout = build_layout("diagnose", topics=about.fields, duration=about.duration)
+    layout = build_layout(
+        "diagnose",
+        topics=about.fields,
+        duration=about.duration,
+        drive_radius=about.drive_radius,
+        facts=about.facts,
+    )
     (folder / LAYOUT).write_text(to_json(layout), encoding="utf-8")
 
 
@@ -33,7 +46,7 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
     Angles and torques are in SI units; the models' offsets against the sensors are removed, as in the fits.
     Where the output's angle is predicted, ``transmission_error`` is it less the motor's angle over the ratio.
     The columns ``..._error`` of a model are measured less predicted, NaN where the measurement is not
-    to be trusted.
+    to be trusted. The verdict, and each effect that was named, are events at the beginning.
     """
     bench = diagnosis.bench
     predictor = bench.predictors[0]
@@ -59,7 +72,20 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
         if series.channel == "output_angle":
             error = Column(series.measured - ideal, "rad", "as measured")
             columns["measured"]["transmission_error"] = error
+    verdict = diagnosis.verdict
+    start = float(time[0])
+    told = [Event(start, "info", "verdict", verdict.sentence)]
+    for effect in verdict.effects:
+        share = f"{100 * effect.explained:.2g} % of what was left, {100 * effect.confidence:.2g} % sure"
+        told.append(Event(start, "info", "effect", f"{effect.name} ({effect.title}): {share}"))
+    names = ", ".join(effect.title or effect.name for effect in verdict.effects)
     return Recording(
         {name: Table(time, table) for name, table in columns.items()},
-        metadata={"scenario_name": record.name, "verdict": diagnosis.verdict.sentence},
+        events=told,
+        metadata={
+            "scenario_name": record.name,
+            "verdict": verdict.sentence,
+            "ratio": repr(float(predictor.ratio)),
+            "replay": json.dumps({"verdict": names or _SHORT[verdict.verdict]}),
+        },
     )

@@ -2,10 +2,36 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from hdsim.recording import Column, Event, Recording, Table
+
+LONGEST_S = 0.6
+
+
+@pytest.fixture(scope="session")
+def log_of(tmp_path_factory):
+    """Makes the log of a scenario's first stretch, once."""
+    import hdsim
+    from hdsim.scenario.model import Scenario
+    from hdsim.simulation.simulate import simulate_to_log
+
+    made: dict[Path, Path] = {}
+    folder = tmp_path_factory.mktemp("shipped")
+
+    def make(path: Path) -> Path:
+        if path not in made:
+            data = hdsim.load_scenario(path).model_dump()
+            slow = data["run"]["sample_rate_hz"] < 100
+            data["run"]["duration_s"] = min(data["run"]["duration_s"], 60.0 if slow else LONGEST_S)
+            made[path] = folder / f"{path.stem}.mcap"
+            simulate_to_log(Scenario.model_validate(data), made[path])
+        return made[path]
+
+    return make
 
 
 @pytest.fixture

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from viewing import apart, messages, turned
 
 import hdsim
 from hdsim.errors import InputError
-from hdsim.log import verify_log, write_log
+from hdsim.log import info_log, read_attachments, verify_log, write_log
 from hdsim.log.import_commands import import_data
 from hdsim.log.importing import import_recording, write_imported
+from hdsim.log.naming import EPOCH_NS
 from hdsim.recording import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -248,12 +250,36 @@ def test_an_imported_recording_opens_in_the_layouts_and_reads_back(tmp_path, tab
     back = hdsim.open_log(path)
     assert list(back.tables) == ["state"]
     np.testing.assert_array_equal(back["motor_torque"], recording["motor_torque"])
-    from hdsim.log import read_attachments
-
     files = read_attachments(path)
-    for name in ("overview", "positioning-error", "diagnose"):
+    for name in ("overview", "positioning-error"):
         assert b"/hd/measured_view.output_angle" in files[f"layout-{name}.json"]
         assert b"/hd/state" not in files[f"layout-{name}.json"]
+        assert b"3D!drive" in files[f"layout-{name}.json"]
+    assert "layout-diagnose.json" not in files
+
+
+def test_an_import_with_both_angles_has_a_scene_of_a_drive_of_its_ratio(tmp_path, table_mapping):
+    recording = import_recording(write_csv(tmp_path / "a.csv", measured()), table_mapping)
+    recording.metadata["ratio"] = "-120.0"
+    path = write_imported(recording, tmp_path / "a.mcap")
+    record = info_log(path).metadata["hdsim.scene"]
+    assert (record["flexspline_teeth"], record["circular_spline_fixed"]) == ("240", "True")
+    last = messages(path, "/hd/transforms")[-1][1]
+    angle = {t.child_frame_id: turned(t) for t in last.transforms}
+    at = (messages(path, "/hd/transforms")[-1][0] - EPOCH_NS) / 1e9
+    row = int(np.argmin(np.abs(recording.time - at)))
+    for frame, channel in (("wave_generator", "motor_angle"), ("output", "output_angle")):
+        assert apart(angle[frame], recording[channel][row], 2 * np.pi) < 1e-6
+    recording.metadata["ratio"] = "50"
+    record = info_log(write_imported(recording, tmp_path / "b.mcap")).metadata["hdsim.scene"]
+    assert (record["circular_spline_teeth"], record["circular_spline_fixed"]) == ("100", "False")
+    del recording.tables["state"].columns["output_angle"]
+    assert "/hd/transforms" not in info_log(write_imported(recording, tmp_path / "c.mcap")).messages
+
+
+def test_an_imported_recording_can_be_imported_again(tmp_path, table_mapping):
+    recording = import_recording(write_csv(tmp_path / "a.csv", measured()), table_mapping)
+    files = read_attachments(write_imported(recording, tmp_path / "a.mcap"))
     (tmp_path / "again.yaml").write_bytes(files["mapping.yaml"])
     again = import_recording(tmp_path / "a.csv", tmp_path / "again.yaml")
     np.testing.assert_array_equal(again["motor_torque"], recording["motor_torque"])

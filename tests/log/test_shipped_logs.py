@@ -16,30 +16,9 @@ from hdsim.log.info import info_log
 from hdsim.log.layout import LAYOUTS, build_layout, playback_speed, split_path
 from hdsim.log.naming import EPOCH_NS
 from hdsim.log.schemas import message_class
-from hdsim.scenario.model import Scenario
-from hdsim.simulation.simulate import simulate_to_log
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.yaml"))
-LONGEST_S = 0.6
-
-
-@pytest.fixture(scope="module")
-def log_of(tmp_path_factory):
-    """Makes the log of a scenario's first stretch, once."""
-    made: dict[Path, Path] = {}
-    folder = tmp_path_factory.mktemp("shipped")
-
-    def make(path: Path) -> Path:
-        if path not in made:
-            data = hdsim.load_scenario(path).model_dump()
-            slow = data["run"]["sample_rate_hz"] < 100
-            data["run"]["duration_s"] = min(data["run"]["duration_s"], 60.0 if slow else LONGEST_S)
-            made[path] = folder / f"{path.stem}.mcap"
-            simulate_to_log(Scenario.model_validate(data), made[path])
-        return made[path]
-
-    return make
 
 
 def test_there_are_nine():

@@ -119,6 +119,15 @@ def test_the_log_holds_all_runs_and_its_layout_shows_only_what_is_there(found, o
     for path in paths:
         topic, field = split_path(path)
         assert field in about.fields[topic], path
+    # The verdict, the effect by its name, and the trace of the re-fit are in the log and in the layout.
+    built = json.loads(text)["configById"]
+    assert log.events[0].message == found.verdict.sentence
+    (named,) = (event for event in log.events if event.source == "effect")
+    assert named.message.startswith("motor_torque_ripple")
+    (verdict,) = (panel for id, panel in built.items() if id.startswith("Indicator!"))
+    assert verdict["fallbackLabel"] == found.verdict.effects[0].title
+    assert "/hd/refit_view.motor_torque" in paths
+    assert {"RosOut!events", "3D!measured_and_modelled"} <= set(built)
 
 
 def test_alternatives_stand_side_by_side_with_what_separates_them(found, tmp_path):
