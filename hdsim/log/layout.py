@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +143,9 @@ def _of_measured(tree: Panel | Split | None) -> Panel | Split | None:
         return text.replace("/hd/state_", "/hd/measured_")
 
     settings = json.loads(moved(json.dumps(tree.settings)))
-    return Panel(tree.kind, tree.title, settings, tuple(moved(path) for path in tree.paths))
+    return replace(
+        tree, settings=settings, paths=tuple(map(moved, tree.paths)), point=tuple(map(moved, tree.point))
+    )
 
 
 def _prune(tree: Panel | Split | None, topics: Topics) -> Panel | Split | None:
@@ -153,7 +156,7 @@ def _prune(tree: Panel | Split | None, topics: Topics) -> Panel | Split | None:
     if tree is None or not tree.paths:
         return tree
     present = tuple(path for path in tree.paths if _has(path, topics))
-    if not present:
+    if not present or (tree.point and not any(_has(path, topics) for path in tree.point)):
         return None
     settings = dict(tree.settings)
     if tree.kind == "3D":
@@ -167,7 +170,7 @@ def _prune(tree: Panel | Split | None, topics: Topics) -> Panel | Split | None:
         settings["paths"] = shown + lines
         if len(shown + lines) == 1:
             settings["legendDisplay"] = "none"
-    return Panel(tree.kind, tree.title, settings, present)
+    return replace(tree, settings=settings, paths=present)
 
 
 def main(folder: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from hdsim.log.facts import Facts
@@ -230,6 +231,11 @@ def diagnose(facts: Facts) -> Split:
         paths = [f"/hd/{stage}_view.{channel}" for stage in shown]
         return plot(title, *paths, styles=[_STAGE_STYLES[stage] for stage in shown])
 
+    def compared(title: str, channel: str) -> Panel:
+        # What was measured and not predicted says nothing of the model.
+        panel = stages(title, channel)
+        return replace(panel, point=tuple(path for path in panel.paths if "/measured_" not in path))
+
     def left(title: str, channel: str) -> Panel:
         return stages(title, channel, "measured")
 
@@ -240,9 +246,9 @@ def diagnose(facts: Facts) -> Split:
         (
             35,
             column(
-                (26, stages("Transmission error [arcsec]", "transmission_error_arcsec")),
-                (26, stages("Output torque [N m]", "output_torque")),
-                (26, stages("Motor torque [N m]", "motor_torque")),
+                (26, compared("Transmission error [arcsec]", "transmission_error_arcsec")),
+                (26, compared("Output torque [N m]", "output_torque")),
+                (26, compared("Motor torque [N m]", "motor_torque")),
                 (22, stages("Motor speed [rad/s]", "motor_velocity")),
             ),
         ),

@@ -19,12 +19,16 @@ _SHORTER = {"input_friction": "friction"}
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel: its type and title, its settings, and the message paths that it draws."""
+    """A panel: its type and title, its settings, the message paths that it draws, and those it is there for.
+
+    Without any of the latter it is left out, whatever else there is to draw.
+    """
 
     kind: str
     title: str
     settings: Mapping[str, Any]
     paths: tuple[str, ...] = ()
+    point: tuple[str, ...] = ()
 
     @property
     def id(self) -> str:

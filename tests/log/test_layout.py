@@ -146,6 +146,15 @@ def test_a_drive_without_teeth_has_no_layout_of_them(tmp_path):
     }
 
 
+def test_a_comparison_has_no_panel_of_what_was_measured_and_not_predicted():
+    channels = {"time": "double", "motor_torque": "double", "motor_torque_error": "double"}
+    topics = {f"/hd/{stage}_view": channels for stage in ("before", "refit", "after")}
+    topics["/hd/measured_view"] = channels | {"output_torque": "double"}
+    panels = layout.build_layout("diagnose", topics=topics)["configById"]
+    assert "Plot!motor_torque" in panels
+    assert "Plot!output_torque" not in panels
+
+
 def test_lines_are_told_apart_by_what_differs():
     facts = Facts(teeth_rate_hz=1e4)
 
