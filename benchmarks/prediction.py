@@ -30,7 +30,7 @@ from hdsim.estimate.plan import plan_for
 from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor
 from hdsim.estimate.records import Record
 from hdsim.estimate.state import State, state_of
-from hdsim.estimate.vector import NEAR, Vector
+from hdsim.estimate.vector import Vector
 from hdsim.scenario import Scenario
 from hdsim.simulation.run import Run
 
@@ -45,6 +45,8 @@ CASES = {
     "tabulated": ("tabulated", {}),
 }  # fmt: skip
 MANY, NUMBERS = 16, 10
+#: Part by which a number is moved.
+NEAR = 1e-7
 
 
 def record_of(seconds: float) -> Record:

@@ -215,7 +215,8 @@ class Bench:
             others: the others, which are linearised beside it.
 
         Returns:
-            The series of the model, and of each other one; None for one that cannot be had this way.
+            The series of the model, and of each other one; None for one that cannot be had this way. Nothing
+            of the model where none can.
 
         Raises:
             PredictionError: the model could not be predicted.
@@ -226,7 +227,7 @@ class Bench:
         for k, other in enumerate(others):
             own = [channels for _, every in told if (channels := every[k]) is not None]
             found.append(self._read(other, own) if len(own) == len(told) else None)
-        return self._read(state, [here for here, _ in told]), found
+        return self._read(state, [here for here, _ in told]) if any(found) else [], found
 
     def reread(self, predictions: Sequence[Array], before: State, now: State) -> list[Array]:
         """Predictions of a state that differs from ``before`` in the readings' gain and delays only."""

@@ -222,7 +222,8 @@ class Predictor:
             others: the others, which are linearised beside it.
 
         Returns:
-            The channels of the one, and of each other; None for one that cannot be had this way.
+            The channels of the one, and of each other; None for one that cannot be had this way. Nothing of
+            the one where none can.
 
         Raises:
             PredictionError: the one cannot be, or could not be integrated.
@@ -230,6 +231,9 @@ class Predictor:
         from hdsim.simulation.sample import alike
 
         end, model = float(self.record.time[-1]) + LEAD_IN_S, self._model(candidate)
+        if model.states:
+            # Laws with a memory have corners, beyond which a tangent is no guide to a fit.
+            return {}, [None] * len(others)
         models: list[Model | None] = []
         for other in others:
             try:
@@ -238,6 +242,8 @@ class Predictor:
                 models.append(None)
                 continue
             models.append(there if alike(model, there, end) else None)
+        if not any(models):
+            return {}, [None] * len(others)
         here, *told = self._run(model, [there for there in models if there is not None])
         beside = iter(told)
         found: list[dict[str, Array] | None] = []

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.numbers import Free, scaled
-from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
 
@@ -19,9 +18,6 @@ from hdsim.estimate.state import State
 #: step will do (five times what the solver's own error can be), and the smallest part of the largest step;
 #: times the step that a coefficient may go for that.
 STEP, SMALL_STEP, CHANGE, LEAST_STEP, MOST_STEP = 1e-1, 3e-2, 0.03, 3e-3, 10.0
-#: Step of a number where the model there is linearised beside the one here: free of the solver's noise, and
-#: small beside the corners of a law (slip elements were 1 % wrong at this, 10 % at 1e-6).
-NEAR = 1e-7
 #: Part of the largest step below which the wanted one is asked for anew.
 BENT = 0.1
 #: Prior spreads of an effect's coefficients (in units of their terms) and of what a fit moves of its shapes.
@@ -217,52 +213,30 @@ def sensitivities(
     here = vector.state(x)
     if predictions is None:
         predictions = bench.predict(here)
-    # How a channel is read needs no simulation.
-    read = {k for k, free in enumerate(vector.frees) if free.reading}
-    tangents = _tangents(bench, vector, x, [k for k in range(first, len(x)) if k not in read])
-    rest = [k for k in range(first, len(x)) if k not in tangents]
     steps = vector.steps(x)
     if like is not None:
-        steps *= _shorter(like, steps, vector.coefficients())
-    secants = _differences(bench, vector, x, predictions, steps, rest)
+        steps *= _shorter(like, steps, vector)
+    columns = _differences(bench, vector, x, predictions, steps, range(first, len(x)))
     if like is None:
         # Secants of changes that are far above the noise show the model's bend, not its slope.
-        factors = _shorter(secants, steps[rest], vector.coefficients()[rest])
-        bent = np.flatnonzero(factors < BENT)
-        again = [rest[k] for k in bent]
-        steps[again] *= factors[bent]
-        secants[:, bent] = _differences(bench, vector, x, predictions, steps, again)
-    columns = tangents | dict(zip(rest, secants.T, strict=True))
-    whole = [columns[k] for k in range(first, len(x))]
-    return np.column_stack(whole) if whole else np.zeros((len(bench.stacked_blocks()), 0))
+        factors = _shorter(columns, steps[first:], vector, first)
+        bent = [k for k in range(first, len(x)) if factors[k - first] < BENT]
+        steps[bent] *= factors[[k - first for k in bent]]
+        columns[:, [k - first for k in bent]] = _differences(bench, vector, x, predictions, steps, bent)
+    return columns
 
 
-def _shorter(like: Array, steps: Array, coefficients: NDArray[np.bool_]) -> Array:
+def _shorter(like: Array, steps: Array, vector: Vector, first: int = 0) -> Array:
     """Factors of finite differences' steps for a change that stands out from the solver's noise, no larger.
 
     Effects are linear in their coefficients, so those may move further.
     """
-    known = like.shape[1]
+    own = slice(first, first + like.shape[1])
     factors = np.ones(len(steps))
-    size = np.sqrt(np.mean(like**2, axis=0)) * np.abs(steps[:known])
-    most = np.where(coefficients[:known], MOST_STEP, 1.0)
-    factors[:known] = np.clip(CHANGE / np.maximum(size, 1e-300), LEAST_STEP, most)
+    size = np.sqrt(np.mean(like**2, axis=0)) * np.abs(steps[: like.shape[1]])
+    most = np.where(vector.coefficients()[own], MOST_STEP, 1.0)
+    factors[: like.shape[1]] = np.clip(CHANGE / np.maximum(size, 1e-300), LEAST_STEP, most)
     return factors
-
-
-def _tangents(bench: Bench, vector: Vector, x: Array, wanted: Sequence[int]) -> dict[int, Array]:
-    """Whitened derivatives of the wanted numbers, shape (rows,) each, of those that can be linearised."""
-    sizes = NEAR * np.sign(vector.steps(x)) * np.where(vector.coefficients(), np.maximum(1.0, np.abs(x)), 1.0)
-    states = [vector.state(x + sizes[k] * (np.arange(len(x)) == k)) for k in wanted]
-    try:
-        here, there = bench.predict_beside(vector.state(x), states)
-    except PredictionError:
-        return {}
-    return {
-        k: bench.trace(here, found) / sizes[k]
-        for k, found in zip(wanted, there, strict=True)
-        if found is not None
-    }
 
 
 def _differences(
