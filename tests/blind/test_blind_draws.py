@@ -123,6 +123,7 @@ def test_drives_stay_within_their_factors():
     assert Path(__file__).with_name("contract.py").exists()
 
 
+@pytest.mark.slow
 def test_a_kept_case_is_the_drawn_one_and_not_drawn_again(tmp_path, monkeypatch):
     task = Task("numpy", 7, 0, cases=tmp_path)
     key = keep(task)["key"]

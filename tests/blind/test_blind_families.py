@@ -171,6 +171,7 @@ def check_case(case: Case, family: str) -> None:
         assert all(np.all(np.isfinite(values)) for values in record.channels.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 3, 7])
 def test_a_mujoco_case_follows_from_number_and_seed(mujoco_family, number):
     first, again = mujoco_family.draw(number, 0), mujoco_family.draw(number, 0)
