@@ -6,9 +6,9 @@ A record of SECONDS (20) at 1 kHz with an encoder's noise is prescribed to a siz
 torques and the output's angle. ``run`` is ``Run(...).record()``: all channels, events, energy audit, SciPy's
 loop. ``predict`` is ``Predictor.predict``, which a diagnosis calls up to a thousand times. Costs are
 processor seconds, the shortest of several; errors the largest relative root-mean-square error of a channel
-against a run at 1e-11. ``sensitivities`` is ``Bench.predict_beside`` with the first ten of the model's own
-numbers, linearised beside it, in units of a prediction: what finite differences need ten of. The last columns
-are wall seconds of sixteen models in one thread and in two.
+against a run at 1e-11. ``ten beside`` is ``samples_beside`` with ten models whose load differs a little, in
+units of that call without them: finite differences to ten numbers need ten. The last columns are wall seconds
+of sixteen models in one thread and in two.
 """
 
 from __future__ import annotations
@@ -24,15 +24,11 @@ from rich.console import Console
 from rich.table import Table
 
 from hdsim.drive.model import Model
-from hdsim.estimate.bench import Bench
-from hdsim.estimate.numbers import base_freedoms
-from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor
+from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor, plan_for
 from hdsim.estimate.records import Record
-from hdsim.estimate.state import State, state_of
-from hdsim.estimate.vector import Vector
 from hdsim.scenario import Scenario
 from hdsim.simulation.run import Run
+from hdsim.simulation.sample import alike, samples_beside
 
 TOLERANCES = (1e-5, 1e-6, 1e-7)
 RIPPLE = {"motor_torque_ripple": {"components": [{"order": 12, "cogging_nm": 0.03}]}}
@@ -44,9 +40,7 @@ CASES = {
     "rigid": ("rigid", {}),
     "tabulated": ("tabulated", {}),
 }  # fmt: skip
-MANY, NUMBERS = 16, 10
-#: Part by which a number is moved.
-NEAR = 1e-7
+MANY, BESIDE = 16, 10
 
 
 def record_of(seconds: float) -> Record:
@@ -62,33 +56,49 @@ def record_of(seconds: float) -> Record:
     )
 
 
-def scenario_of(mesh: str, effects: dict[str, object]) -> Scenario:
+def candidate_of(mesh: str, effects: dict[str, object]) -> Candidate:
     """A model with an arm on its output."""
-    return Scenario.model_validate({
+    scenario = Scenario.model_validate({
         "drive": {"preset": "csg-20-100", "mesh": {"model": mesh}},
         "effects": effects,
         "command": {"motor": {"type": "free"}},
         "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
         "run": {"duration_s": 1.0},
     })  # fmt: skip
+    return Candidate(scenario.drive, scenario.effects.active(), scenario.load)
 
 
-def neighbours(bench: Bench, state: State) -> list[State]:
-    """The model with each of its first numbers moved a little."""
-    frees = tuple(base_freedoms(state, bench.channels))
-    vector = Vector(state, frees, 0)
-    own = [k for k, free in enumerate(frees) if not free.reading][:NUMBERS]
-    return [vector.state(vector.start() + NEAR * (np.arange(len(frees)) == k)) for k in own]
+def model_of(
+    predictor: Predictor, candidate: Candidate, *, heavier: float = 0.0, audited: bool = True
+) -> Model:
+    """The model under the measured motion, its load's inertia larger by a part of itself."""
+    return Model(
+        candidate.drive,
+        [*candidate.effects.values(), candidate.load],
+        load_inertia_kg_m2=(1.0 + heavier) * candidate.load.inertia_kg_m2,
+        motions={"motor": predictor.motion},
+        audited=audited,
+    )
+
+
+def beside(predictor: Predictor, candidate: Candidate, repeats: int) -> str:
+    """Cost of ten models that are linearised beside one, in units of that one alone."""
+    times, channels = predictor.record.time + LEAD_IN_S, predictor.plan.channels
+    one, *others = (
+        model_of(predictor, candidate, heavier=1e-7 * k, audited=False) for k in range(BESIDE + 1)
+    )
+    if not alike(one, others[0], float(times[-1])):
+        return "-"
+    costs = [
+        cheapest(partial(samples_beside, one, several, times, channels, rtol=TOLERANCES[1]), repeats)
+        for several in ((), others)
+    ]
+    return f"{costs[1] / costs[0]:.1f}"
 
 
 def run_of(predictor: Predictor, candidate: Candidate, rtol: float) -> dict[str, np.ndarray]:
     """The predicted channels from the public way of simulating."""
-    model = Model(
-        candidate.drive,
-        [*candidate.effects.values(), candidate.load],
-        load_inertia_kg_m2=candidate.load.inertia_kg_m2,
-        motions={"motor": predictor.motion},
-    )
+    model = model_of(predictor, candidate)
     run = Run(model, duration_s=LEAD_IN_S + predictor.record.duration_s, sample_rate_hz=1000.0, rtol=rtol)
     recorded = run.record()
     count = len(predictor.record.time)
@@ -121,8 +131,7 @@ def at_equal_error(costs: list[float], errors: list[float], wanted: float) -> fl
 def row(record: Record, name: str) -> list[str]:
     """A line of the table."""
     mesh, effects = CASES[name]
-    scenario = scenario_of(mesh, effects)
-    candidate = Candidate(scenario.drive, scenario.effects.active(), scenario.load)
+    candidate = candidate_of(mesh, effects)
     predictor = Predictor(record, plan_for(record), candidate.drive.ratio)
     repeats = 1 if mesh == "tabulated" else 5
     exact = run_of(predictor, candidate, 1e-8 if mesh == "tabulated" else 1e-11)
@@ -138,11 +147,6 @@ def row(record: Record, name: str) -> list[str]:
             errors[way].append(max(error(call(), exact), 1e-14))
             costs[way].append(cheapest(call, repeats))
     predictor.rtol = TOLERANCES[1]
-    bench, state = Bench([predictor]), state_of(scenario)
-    others = neighbours(bench, state)
-    _, beside = bench.predict_beside(state, others)
-    own = sum(found is not None for found in beside)
-    slopes = cheapest(partial(bench.predict_beside, state, others), repeats) / costs["predict"][1]
     seconds = []
     for threads in (1, 2):
         began = time.perf_counter()
@@ -159,7 +163,7 @@ def row(record: Record, name: str) -> list[str]:
         f"{wanted:.1e}",
         f"{errors['predict'][1]:.1e}",
         "-" if math.isnan(equal) else f"{equal:.1f}",
-        f"{slopes:.1f} for {own}" if own else "-",
+        beside(predictor, candidate, repeats),
         *(f"{value:.2f}" for value in seconds),
     ]
 
@@ -169,13 +173,13 @@ def main() -> None:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
     record = record_of(seconds)
     table = Table(title=f"{seconds:g} s at 1 kHz, processor ms at a tolerance of 1e-6")
-    titles = ("run", "predict", "ratio", "error run", "predict", "ratio at equal error", "sensitivities")
+    titles = ("run", "predict", "ratio", "error run", "predict", "ratio at equal error", "ten beside")
     table.add_column("model")
     for title in (*titles, f"{MANY} in one thread, s", "in two, s"):
         table.add_column(title, justify="right")
     for name in CASES:
         table.add_row(*row(record, name))
-    Console(width=170).print(table)
+    Console(width=160).print(table)
 
 
 if __name__ == "__main__":

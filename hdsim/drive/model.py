@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -128,16 +127,8 @@ class Model(Contributed):
         if isinstance(mesh, RigidMesh):
             return None, np.zeros(0)
         if isinstance(mesh, LumpedMesh):
-            torsion = self.drive.torsion
             reach = spring.TABLE_REACH * self.rated_torque_nm
-            if self._given.wind_ups:
-                step, cells = spring.spring_cells(
-                    [partial(spring.catalogue_wind_up, torsion), *self._given.wind_ups],
-                    [torsion.torque_t1_nm, torsion.torque_t2_nm],
-                    reach,
-                )
-            else:
-                step, cells = spring.catalogue_cells(torsion, reach)
+            step, cells = spring.catalogue_cells(self.drive.torsion, tuple(self._given.wind_ups), reach)
             parameters = np.zeros(_mesh_layout.HEADER)
             parameters[_mesh_layout.INVERSE_RATIO] = 1 / self.ratio
             # A lumped mesh has no teeth to press together: a preload only takes up play.

@@ -49,13 +49,15 @@ def catalogue_wind_up(torsion: Torsion, torque: Array) -> Array:
 
 
 @lru_cache(maxsize=32)
-def catalogue_cells(torsion: Torsion, largest_torque_nm: float) -> tuple[float, Array]:
-    """Torque over twist of the catalogue's wind-up alone, see ``spring_cells``; not to be written to.
+def catalogue_cells(
+    torsion: Torsion, beside: tuple[Callable[[Array], Array], ...], largest_torque_nm: float
+) -> tuple[float, Array]:
+    """Torque over twist of the catalogue's wind-up and others beside it, see ``spring_cells``; read-only.
 
     Kept for the next model: a fit makes hundreds that differ in other numbers.
     """
     corners = [torsion.torque_t1_nm, torsion.torque_t2_nm]
-    step, cells = spring_cells([partial(catalogue_wind_up, torsion)], corners, largest_torque_nm)
+    step, cells = spring_cells([partial(catalogue_wind_up, torsion), *beside], corners, largest_torque_nm)
     cells.setflags(write=False)
     return step, cells
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 
 from hdsim.errors import InputError
 from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
-from hdsim.estimate.records import Array
-from hdsim.estimate.series import Series
+from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
@@ -31,6 +31,33 @@ SETTLE_S = 0.05
 #: Share of the residual that counts as noise beside the channel's noise, so that a channel with little
 #: noise does not alone decide.
 MODEL_NOISE = 0.1
+
+
+@dataclass
+class Series:
+    """One predicted channel of one record.
+
+    Attributes:
+        record: index of the record's predictor.
+        channel: name of the channel.
+        measured: shape (n,).
+        train: samples that fits may see.
+        hold: samples that only the proof sees.
+        block: shape (n,), number of the block that each sample belongs to, unique over all records.
+        noise: standard deviation of the channel's noise.
+        reading: the same of a single reading, where a sample is the mean of several.
+        sigma: standard deviation by which residuals are divided.
+    """
+
+    record: int
+    channel: str
+    measured: Array
+    train: Mask
+    hold: Mask
+    block: NDArray[np.int64]
+    noise: float
+    reading: float
+    sigma: float = 1.0
 
 
 class Bench:
@@ -194,40 +221,13 @@ class Bench:
         """
         reach = len(self.predictors) if everything else self.training
         candidate = state.candidate()
-        return self._read(state, [p.predict(candidate) for p in self.predictors[:reach]])
-
-    def _read(self, state: State, found: Sequence[Mapping[str, Array]]) -> list[Array]:
-        """All series as a state's sensors read what is predicted of the first records."""
+        found: list[Mapping[str, Array]] = [p.predict(candidate) for p in self.predictors[:reach]]
         return [
             state.reading(s.channel, self._time(s), found[s.record][s.channel])
-            if s.record < len(found)
+            if s.record < reach
             else np.zeros(0)
             for s in self.series
         ]
-
-    def predict_beside(
-        self, state: State, others: Sequence[State]
-    ) -> tuple[list[Array], list[list[Array] | None]]:
-        """Predictions of the training records for a model and those that differ very little from it.
-
-        Args:
-            state: the model.
-            others: the others, which are linearised beside it.
-
-        Returns:
-            The series of the model, and of each other one; None for one that cannot be had this way. Nothing
-            of the model where none can.
-
-        Raises:
-            PredictionError: the model could not be predicted.
-        """
-        candidate, candidates = state.candidate(), [other.candidate() for other in others]
-        told = [p.predict_beside(candidate, candidates) for p in self.predictors[: self.training]]
-        found: list[list[Array] | None] = []
-        for k, other in enumerate(others):
-            own = [channels for _, every in told if (channels := every[k]) is not None]
-            found.append(self._read(other, own) if len(own) == len(told) else None)
-        return self._read(state, [here for here, _ in told]) if any(found) else [], found
 
     def reread(self, predictions: Sequence[Array], before: State, now: State) -> list[Array]:
         """Predictions of a state that differs from ``before`` in the readings' gain and delays only."""

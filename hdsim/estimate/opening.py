@@ -9,8 +9,7 @@ from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import check_record
 from hdsim.estimate.data_problems import Check
-from hdsim.estimate.plan import LoadSource, Locked
-from hdsim.estimate.predict import predictors
+from hdsim.estimate.predict import LoadSource, Locked, predictors
 from hdsim.estimate.records import Record, record_from
 from hdsim.estimate.thin import over, thinned
 

@@ -13,13 +13,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from hdsim.errors import PhysicsError
+from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
-from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, least_squares_spline, signal, smoothed
 from hdsim.estimate.unloaded import unloaded_angle
@@ -27,7 +26,6 @@ from hdsim.estimate.zeros import Zero, between_zeros
 
 if TYPE_CHECKING:
     from hdsim.actuation.signal_data import SignalData
-    from hdsim.drive.model import Model
     from hdsim.drive.parameters import Drive
     from hdsim.parts import Builder, Effect
 
@@ -38,6 +36,26 @@ CARRIED = "carried_torque"
 #: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
 #: noise in a Jacobian looks like information; and the tolerance of a search, whose steps are larger.
 RTOL, COARSE_RTOL = 1e-6, 3e-5
+
+Locked = Literal["", "motor", "output"]
+LoadSource = Literal["scenario", "load_torque", "output_torque"]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a model is told of a record, and what it is asked.
+
+    Attributes:
+        motion: ``motor_angle`` or ``output_angle``: the measured motion that is prescribed.
+        load: where the load's torque comes from.
+        channels: the channels that are predicted.
+        locked: the side that the scenario locks, if any.
+    """
+
+    motion: str
+    load: LoadSource
+    channels: tuple[str, ...]
+    locked: Locked = ""
 
 
 @dataclass(frozen=True)
@@ -72,6 +90,55 @@ class _Gravity:
     def contribute(self, build: Builder) -> None:
         if self.load.gravity is not None:
             self.load.gravity.contribute(build)
+
+
+def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked = "") -> Plan:
+    """Decide what is prescribed and what can be predicted.
+
+    Args:
+        record: the measured run.
+        load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
+        locked: the side that the scenario locks, if any.
+
+    Raises:
+        InputError: nothing can be predicted; the message names what is missing.
+    """
+    has = record.readable
+    moving = {c for c in has if float(np.ptp(record.filled(c))) > 0}
+    if load is None:
+        load = "load_torque" if "load_torque" in moving else "scenario"
+    if load != "scenario" and load not in has:
+        raise InputError(f"{record.name}: the load is to come from {load}, which is not measured")
+    if locked == "motor":
+        return _motor_locked(record, moving)
+    if "motor_angle" in has:
+        motion = "motor_angle"
+    elif "output_angle" in has and not locked:
+        motion = "output_angle"
+    else:
+        raise InputError(
+            f"{record.name}: a motion is needed, motor_angle or output_angle; found {', '.join(sorted(has))}"
+        )
+    predicted = [c for c in ("motor_torque", "output_angle", "output_torque") if c in moving]
+    if motion == "output_angle" or locked:
+        predicted = [c for c in predicted if c != "output_angle"]
+    if not predicted:
+        raise InputError(
+            f"{record.name}: nothing can be predicted from {', '.join(sorted(has))}: with {motion} given, "
+            "motor_torque, output_torque or (with motor_angle) output_angle must be measured and vary"
+        )
+    return Plan(motion, load, tuple(predicted), locked)
+
+
+def _motor_locked(record: Record, moving: set[str]) -> Plan:
+    """A drive that is twisted from its output: the torque follows from the angle."""
+    if {"output_angle", "output_torque"} <= moving:
+        return Plan("output_angle", "scenario", ("output_torque",), "motor")
+    raise InputError(
+        f"{record.name}: with the motor locked, output_angle and output_torque are needed and must vary; "
+        f"found {', '.join(sorted(moving)) or 'nothing that varies'} (a load that is measured at the output, "
+        "without inertia between, may be given as output_torque with its sign turned)"
+    )
 
 
 class Predictor:
@@ -210,58 +277,11 @@ class Predictor:
         Raises:
             PredictionError: the model cannot be, or could not be integrated.
         """
-        return self._run(self._model(candidate), ())[0]
-
-    def predict_beside(
-        self, candidate: Candidate, others: Sequence[Candidate]
-    ) -> tuple[dict[str, Array], list[dict[str, Array] | None]]:
-        """What ``predict`` tells of a candidate and of others that differ very little from it.
-
-        Args:
-            candidate: the one.
-            others: the others, which are linearised beside it.
-
-        Returns:
-            The channels of the one, and of each other; None for one that cannot be had this way. Nothing of
-            the one where none can.
-
-        Raises:
-            PredictionError: the one cannot be, or could not be integrated.
-        """
-        from hdsim.simulation.sample import alike
-
-        end, model = float(self.record.time[-1]) + LEAD_IN_S, self._model(candidate)
-        if model.states:
-            # Laws with a memory have corners, beyond which a tangent is no guide to a fit.
-            return {}, [None] * len(others)
-        models: list[Model | None] = []
-        for other in others:
-            try:
-                there = self._model(other)
-            except PredictionError:
-                models.append(None)
-                continue
-            models.append(there if alike(model, there, end) else None)
-        if not any(models):
-            return {}, [None] * len(others)
-        here, *told = self._run(model, [there for there in models if there is not None])
-        beside = iter(told)
-        found: list[dict[str, Array] | None] = []
-        for one in models:
-            channels = next(beside) if one is not None else None
-            sound = channels is not None and all(np.all(np.isfinite(v)) for v in channels.values())
-            found.append(channels if sound else None)
-        return here, found
-
-    def _model(self, candidate: Candidate) -> Model:
-        """The model under the measured motion.
-
-        Raises:
-            PredictionError: it cannot be.
-        """
         from hdsim.actuation.shapes import Hold
         from hdsim.actuation.signal_data import SignalData
         from hdsim.drive.model import Model
+        from hdsim.simulation.run import RunFailed
+        from hdsim.simulation.sample import sample
 
         load = candidate.load
         parts: list[Any] = [*candidate.effects.values(), _Gravity(load)]
@@ -296,29 +316,14 @@ class Predictor:
             raise PredictionError(str(error)) from None
         for side in {"ring", "output"} & set(model.place_of):
             model.system.y0[model.place_of[side]] = self._zero
-        return model
-
-    def _run(self, model: Model, others: Sequence[Model]) -> list[dict[str, Array]]:
-        """What a model and others beside it tell.
-
-        Raises:
-            PredictionError: the model could not be integrated.
-        """
-        from hdsim.simulation.run import RunFailed
-        from hdsim.simulation.sample import samples_beside
-
         self.runs += 1
         asked = dict.fromkeys(self.plan.channels)
         if self._slow is not None:
             asked["output_torque"] = None
         try:
-            every = samples_beside(model, others, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol)
+            got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol)
         except RunFailed as error:
             raise PredictionError(str(error)) from None
-        return [self._told(got) for got in every]
-
-    def _told(self, got: dict[str, Array]) -> dict[str, Array]:
-        """The predicted channels, of a run's."""
         found = {c: got.get(f"measured_{c}", got[c]) for c in self.plan.channels}
         if self._slow is not None:
             # Not compared, but it tells an effect that acts behind the sensor, where none can be seen.

@@ -14,8 +14,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import robust_covariance
 from hdsim.estimate.fit import base_intervals, fit
 from hdsim.estimate.numbers import Free, base_freedoms
-from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import Predictor, predictors
+from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, tie, together, with_delays
 from hdsim.estimate.spline import smoothed

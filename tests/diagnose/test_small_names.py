@@ -11,8 +11,7 @@ from diagnose_bench import motion, rigid_record, scenario
 
 from hdsim.diagnose.workflow import diagnose
 from hdsim.effects import catalogue
-from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import Predictor
+from hdsim.estimate.predict import Predictor, plan_for
 from hdsim.estimate.records import Record
 from hdsim.estimate.state import state_of
 

@@ -6,8 +6,7 @@ import pytest
 from hdsim.actuation.loads import Load
 from hdsim.drive.parameters import Drive
 from hdsim.effects.thermal_friction import ThermalFriction
-from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import Candidate, Predictor
+from hdsim.estimate.predict import Candidate, Predictor, plan_for
 from hdsim.estimate.records import Record
 
 SPEED, BETA, BETA_C, REFERENCE = 200.0, 0.04, 0.012, 20.0

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.noise import noise_floor, quantisation_step
-from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import Predictor, predictors
+from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
 
 JOINT = Path(__file__).parents[3] / "shared" / "data" / "lara8-joint3-dual-encoder" / "joint3.csv"

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from hdsim.estimate.noise import noise_of_means, quantisation_step
-from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import Predictor
+from hdsim.estimate.predict import Predictor, plan_for
 from hdsim.estimate.records import Record
 from hdsim.estimate.thin import readings_of_means, thinned
 

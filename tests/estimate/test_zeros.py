@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import hdsim
-from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import Candidate, Predictor
+from hdsim.estimate.predict import Candidate, Predictor, plan_for
 from hdsim.estimate.records import Record
 from hdsim.estimate.zeros import between_zeros
 
