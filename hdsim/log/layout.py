@@ -15,9 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from hdsim.errors import InputError
-from hdsim.log.facts import SPEEDS as SPEEDS
-from hdsim.log.facts import Facts
-from hdsim.log.facts import playback_speed as playback_speed
+from hdsim.log.facts import Facts, playback_speed
 from hdsim.log.layout_trees import FIRST, NEEDED, NOT_ATTACHED
 from hdsim.log.layout_trees import LAYOUTS as LAYOUTS
 from hdsim.log.panels import Panel, Split, in_metres

@@ -85,17 +85,38 @@ class OrderCollector:
         lasted = np.diff(np.interp(whole, motor, time))
         if np.ptp(lasted) > _STEADY * lasted.mean():
             return None
-        at = np.linspace(motor[0], whole[-1], (len(whole) - 1) * _PER_TURN, endpoint=False)
-        even = ARCSEC_PER_RAD * np.interp(at, motor, error)
-        # A Hann window: what is no whole number of cycles in the run leaks to its neighbours only.
-        window = np.hanning(len(even) + 1)[:-1]
-        amplitude = 2 * np.abs(np.fft.rfft((even - even.mean()) * window)) / window.sum()
-        order = np.arange(len(amplitude)) / (len(whole) - 1)
+        cycles = len(whole) - 1
+        order, amplitude = order_spectrum(motor, ARCSEC_PER_RAD * error, cycles, cycles * _PER_TURN)
         highest = min(_HIGHEST_ORDER, 0.4 * len(motor) / turns)
         shown = order <= highest
         order, amplitude = _peaks(order[shown], amplitude[shown])
         step = max(1, -(-len(motor) // _MOST_POINTS))
         return Spectrum(order, amplitude, np.degrees(output[::step]), ARCSEC_PER_RAD * error[::step])
+
+
+def order_spectrum(
+    angle: Array, values: Array, turns: float | None = None, count: int | None = None
+) -> tuple[Array, Array]:
+    """Amplitude spectrum over orders, of samples at any increasing or decreasing angle.
+
+    A Hann window: what is no whole number of cycles leaks to its neighbours only.
+
+    Args:
+        angle: shape (n,), rad, strictly monotonic.
+        values: shape (n,).
+        turns: from the first angle on, of which to make it; all by default.
+        count: even steps of the angle in them; n by default.
+
+    Returns:
+        Orders per turn, shape (m,), and amplitudes of the sines at them, shape (m,).
+    """
+    if angle[-1] < angle[0]:
+        angle = -angle
+    turns, count = turns or (angle[-1] - angle[0]) / _TURN, count or len(angle)
+    even = np.interp(angle[0] + turns * _TURN / count * np.arange(count), angle, values)
+    window = np.hanning(count + 1)[:-1]
+    spectrum = np.fft.rfft(window * (even - even.mean()))
+    return np.arange(len(spectrum)) / turns, 2.0 * np.abs(spectrum) / float(window.sum())
 
 
 def _peaks(order: Array, amplitude: Array) -> tuple[Array, Array]:

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hdsim.log.orders import order_spectrum
 from hdsim.plot import style, units
 from hdsim.plot.curves import is_nothing
 from hdsim.plot.panels import Panel
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from hdsim.recording import Recording
-
-Array = NDArray[np.float64]
 
 #: Turns of the wave generator, in one direction, below which orders are not worth a panel.
 TURNS = 10
@@ -49,23 +47,3 @@ def order_panel(recording: Recording) -> Panel | None:
         axes.set_ylabel(f"amplitude ({unit.name})")
 
     return Panel("Orders of the transmission error", draw)
-
-
-def order_spectrum(angle: Array, values: Array) -> tuple[Array, Array]:
-    """Amplitude spectrum over orders, of samples at any increasing or decreasing angle.
-
-    Args:
-        angle: shape (n,), rad, strictly monotonic.
-        values: shape (n,).
-
-    Returns:
-        Orders per turn, shape (m,), and amplitudes of the sines at them, shape (m,), by a Hann window.
-    """
-    if angle[-1] < angle[0]:
-        angle = -angle
-    count = len(angle)
-    even = angle[0] + (angle[-1] - angle[0]) / count * np.arange(count)
-    window = np.hanning(count + 1)[:-1]
-    spectrum = np.fft.rfft(window * np.interp(even, angle, values - values.mean()))
-    orders = np.arange(len(spectrum)) * 2 * math.pi / (angle[-1] - angle[0])
-    return orders, 2.0 * np.abs(spectrum) / float(window.sum())

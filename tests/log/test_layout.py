@@ -25,7 +25,7 @@ from hdsim.log import (
     verify_log,
     write_log,
 )
-from hdsim.log.facts import Facts
+from hdsim.log.facts import Facts, playback_speed
 from hdsim.log.schemas import message_class
 from hdsim.recording import Column, Recording, Table
 
@@ -295,7 +295,7 @@ def test_states_change_where_the_run_does(diagnosed):
     [(0.02, 0.01), (0.5, 0.05), (5.0, 0.5), (10.0, 1.0), (60.0, 1.0), (90.0, 2.0), (1800.0, 5.0), (0.0, 1.0)],
 )
 def test_short_runs_play_slowly_and_long_ones_fast(duration, speed):
-    assert layout.playback_speed(duration) == speed
+    assert playback_speed(duration) == speed
 
 
 @pytest.mark.parametrize(

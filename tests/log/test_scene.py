@@ -13,7 +13,6 @@ from hdsim.errors import InputError
 from hdsim.log import (
     LogWriter,
     info_log,
-    layout,
     naming,
     open_log,
     panels,
@@ -25,6 +24,7 @@ from hdsim.log import (
     verify_log,
     write_log,
 )
+from hdsim.log.facts import playback_speed
 from hdsim.recording import Column, Recording, Table
 
 
@@ -47,8 +47,8 @@ def test_frames_come_at_the_rate_that_playback_shows_and_turn_the_bodies(log):
     frames = messages(log, scene.TRANSFORM_TOPIC)
     # At least 30 for each second of playback, and one for every 15 degrees that the motor turns.
     turned_on = np.abs(np.diff(run["motor_angle"])).sum() / math.radians(15)
-    assert 4.0 * 30 / layout.playback_speed(4.0) <= len(frames)
-    assert turned_on <= len(frames) < 4.0 * 30 / layout.playback_speed(4.0) + turned_on + 2
+    assert 4.0 * 30 / playback_speed(4.0) <= len(frames)
+    assert turned_on <= len(frames) < 4.0 * 30 / playback_speed(4.0) + turned_on + 2
     for log_time, frame in frames[:: len(frames) // 7]:
         k = int(np.flatnonzero(naming.to_ns(run.time) == log_time)[0])
         by_name = {t.child_frame_id: t for t in frame.transforms}

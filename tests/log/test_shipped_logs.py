@@ -12,8 +12,9 @@ from test_javascript_reader import read, reader  # noqa: F401 - a fixture
 
 import hdsim
 from hdsim.log import read_attachments, verify_log
+from hdsim.log.facts import playback_speed
 from hdsim.log.info import info_log
-from hdsim.log.layout import LAYOUTS, build_layout, playback_speed, split_path
+from hdsim.log.layout import LAYOUTS, build_layout, split_path
 from hdsim.log.naming import EPOCH_NS
 from hdsim.log.schemas import message_class
 

@@ -11,7 +11,8 @@ import pytest
 from viewing import apart, major_axis, points_of, views
 
 import hdsim
-from hdsim.log import layout, naming, read_attachments
+from hdsim.log import naming, read_attachments
+from hdsim.log.facts import SPEEDS
 from hdsim.log.info import info_log
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -138,7 +139,7 @@ def test_no_layout_with_a_drive_plays_faster_than_the_eye_can_follow(log_of, nam
         built = json.loads(text) if attachment.startswith("layout-") else {"configById": {}}
         if any(panel.startswith("3D!") for panel in built["configById"]):
             speed = built["playbackConfig"]["speed"]
-            assert turns_per_s * speed <= 4.0 * 1.01 or speed == min(layout.SPEEDS)
+            assert turns_per_s * speed <= 4.0 * 1.01 or speed == min(SPEEDS)
             assert 360 * turns_per_s * speed / 30 < 90
             shown += 1
     assert shown

@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner
 
 from hdsim.errors import InputError
+from hdsim.log.orders import order_spectrum
 from hdsim.plot import plot_recording
 from hdsim.plot.commands import plot
 from hdsim.plot.curves import thinned
-from hdsim.plot.orders import order_spectrum
 from hdsim.plot.teeth import MAP_ANGLES, MAP_TIMES, force_map
 from hdsim.recording import Column, Event, Recording, Table
 
