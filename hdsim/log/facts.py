@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hdsim.errors import InputError
-from hdsim.log.naming import Array
+from hdsim.log.naming import RUN_TABLES, Array
 
 RECORD = "hdsim.replay"
 KEY = "replay"
@@ -23,7 +23,6 @@ _MOST_TURNS_PER_S = 4.0
 """Of the ellipse as it is played back: at 30 frames a second it looks reversed from 7.5 a second on."""
 _SPEED_WINDOW_S = 2e-3
 """Time over which a motor's speed is taken: longer than a sensor's noise, shorter than a move."""
-_MOTOR_TABLES = ("state", "measured")
 
 
 @dataclass(frozen=True)
@@ -135,12 +134,12 @@ class FactsCollector:
         """Take the next rows of a table; columns (n,) or (n, k)."""
         if not len(time):
             return
-        if table in _MOTOR_TABLES and "motor_angle" in columns and columns["motor_angle"].ndim == 1:
+        if table in RUN_TABLES and "motor_angle" in columns and columns["motor_angle"].ndim == 1:
             self._motor(time, columns["motor_angle"])
         if table == "teeth":
             self._teeth_times = [*self._teeth_times, *time[:2].tolist()][:2]
             self._range("force_n", columns.get("normal_force"))
-        if table in _MOTOR_TABLES:
+        if table in RUN_TABLES:
             self._range("output_torque_nm", columns.get("output_torque"))
             self._range("motor_torque_nm", columns.get("motor_torque"))
 

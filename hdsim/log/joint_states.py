@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 TOPIC = "/joint_states"
 MESSAGE_TYPE = "sensor_msgs/msg/JointState"
 JOINTS = ("motor", "output")
-_TABLES = ("state", "measured")
 _FRAME = "world"
 _FIELDS = ("angle", "velocity", "torque")
 _MOST_ROWS = 4096
@@ -183,7 +182,7 @@ class JointStates:
 
     def feed(self, table: str, time: Array, columns: Mapping[str, Array]) -> None:
         """Take the next rows of a table."""
-        if table not in _TABLES or self._table not in ("", table) or not has_joints(list(columns)):
+        if table not in naming.RUN_TABLES or self._table not in ("", table) or not has_joints(list(columns)):
             return
         self._table = table
         if self._stream is None:

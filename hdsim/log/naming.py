@@ -31,7 +31,9 @@ STATIC_TOPIC = "/hd/static"
 EVENT_TOPIC = "/hd/events"
 VIEW_SUFFIX = "_view"
 LOOP_SUFFIX = "_loop"
-VIEWED_TABLES = ("state", "measured", "before", "refit", "after")
+RUN_TABLES = ("state", "measured")
+"""Tables that may hold a run itself, simulated or measured."""
+VIEWED_TABLES = (*RUN_TABLES, "before", "refit", "after")
 """Tables that viewers plot: runs, alone or held against each other."""
 ORIGIN_KEY = "recorded"
 MEASURED = "measured"

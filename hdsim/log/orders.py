@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.log.naming import Array
+from hdsim.log.naming import RUN_TABLES, Array
 from hdsim.log.viewing import ARCSEC_PER_RAD
 
 ORDERS, OVER_ANGLE = "orders", "over_angle"
@@ -53,7 +53,7 @@ class OrderCollector:
     def feed(self, table: str, time: Array, columns: Mapping[str, Array]) -> None:
         """Take the next rows of a table; only a state's, or a measured one's, count."""
         needed = ("motor_angle", "output_angle", "transmission_error")
-        if self._table not in ("", table) or table not in ("state", "measured") or not len(time):
+        if self._table not in ("", table) or table not in RUN_TABLES or not len(time):
             return
         if any(name not in columns or columns[name].ndim != 1 for name in needed):
             return

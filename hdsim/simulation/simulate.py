@@ -182,13 +182,14 @@ def provenance(scenario: Scenario) -> dict[str, str]:
 
 def _for_replay(run: Run) -> dict[str, str]:
     """What layouts know of a run before it begins: the torques that its lines are held against."""
+    from hdsim.log.facts import KEY
     from hdsim.simulation.events import torque_limit
 
     limit = torque_limit(run.model)
     facts = {"rated_torque_nm": run.model.rated_torque_nm}
     if math.isfinite(limit):
         facts["torque_limit_nm"] = limit
-    return {"replay": json.dumps(facts)}
+    return {KEY: json.dumps(facts)}
 
 
 def summary(run: Run, seconds: float) -> dict[str, str]:

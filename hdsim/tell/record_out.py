@@ -48,6 +48,8 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
     The columns ``..._error`` of a model are measured less predicted, NaN where the measurement is not
     to be trusted. The verdict, and each effect that was named, are events at the beginning.
     """
+    from hdsim.log.facts import KEY
+
     bench = diagnosis.bench
     predictor = bench.predictors[0]
     record = predictor.record
@@ -86,6 +88,6 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
             "scenario_name": record.name,
             "verdict": verdict.sentence,
             "ratio": repr(float(predictor.ratio)),
-            "replay": json.dumps({"verdict": names or _SHORT[verdict.verdict]}),
+            KEY: json.dumps({"verdict": names or _SHORT[verdict.verdict]}),
         },
     )
