@@ -126,7 +126,7 @@ def _own(added: Added, location: Location) -> float:
 def _rest(bench: Bench, predictions: Sequence[Array]) -> RestEvidence | None:
     """The training channel that is left with most beyond its noise."""
     worst: RestEvidence | None = None
-    for series, residual in zip(bench.series, bench.residuals(predictions), strict=True):
+    for series, residual in zip(bench.series, bench.residuals(predictions, drift=True), strict=True):
         if series.record >= bench.training or not series.train.any() or series.noise <= 0:
             continue
         # In units of a single reading's noise, however many a sample is the mean of.

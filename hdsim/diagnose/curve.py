@@ -101,7 +101,7 @@ def fit_curve(
         The curve, or None when none explains enough of what has not been fitted.
     """
     bench.weigh(bench.residuals(fit.predictions))
-    residuals = bench.residuals(fit.predictions)
+    residuals = bench.residuals(fit.predictions, drift=True)
     left = left_of(bench, fit)
     best: tuple[float, Kind, Array, Added, Array, Penalised] | None = None
     tried: dict[str, float] = {}

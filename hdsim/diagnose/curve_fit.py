@@ -126,8 +126,6 @@ def solved(
     theta = np.zeros(len(fit.frees))
     chosen: tuple[float, State, list[Array], Array] | None = None
     rest = bench.stacked(bench.residuals(fit.predictions))
-    numbers = bench.stacked_series()
-    offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
     # Delays stay where they are: nothing bounds them here.
     own = fit.columns[:, : len(fit.frees)] * np.array([not free.step for free in fit.frees])
     for _ in range(2):
@@ -138,7 +136,9 @@ def solved(
             even = np.interp(np.linspace(at[0], at[-1], FINE), at, coefficients)
             coefficients = coefficients - np.median(even)
         # The model's own numbers take their part again.
-        moved, *_ = np.linalg.lstsq(np.hstack([own, offsets]), rest - columns @ step, rcond=1e-6)
+        moved, *_ = np.linalg.lstsq(
+            np.hstack([own, bench.offset_columns()]), rest - columns @ step, rcond=1e-6
+        )
         # What the data hardly tell is not carried away.
         theta = np.clip(theta + moved[: len(theta)], -2.0, 2.0)
         state = scaled(fit.state, fit.frees, theta.tolist())

@@ -28,7 +28,7 @@ def remainder(bench: Bench, predictions: Sequence[Array]) -> Remainder | None:
         predictions: of the training records.
     """
     worst: Remainder | None = None
-    for series, residual in zip(bench.series, bench.residuals(predictions), strict=True):
+    for series, residual in zip(bench.series, bench.residuals(predictions, drift=True), strict=True):
         if series.record >= bench.training or not series.train.any():
             continue
         record = bench.predictors[series.record].record

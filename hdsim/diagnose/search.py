@@ -108,7 +108,7 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
         # What is left is what this fit leaves, not the rough one before it.
         found.left = left_of(bench, found.fit)
         last = found.stages[-1]
-        last.location = locate(bench, found.left, bench.residuals(found.fit.predictions))
+        last.location = locate(bench, found.left, bench.residuals(found.fit.predictions, drift=True))
         last.power = found.left.power
     return found
 
@@ -119,7 +119,9 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     title = "refit" if not found.named else f"with {found.named[-1].name}"
     during("locate", f"locating what is left {title}")
     found.left = left_of(bench, current)
-    stage = Stage(title, locate(bench, found.left, bench.residuals(current.predictions)), found.left.power)
+    stage = Stage(
+        title, locate(bench, found.left, bench.residuals(current.predictions, drift=True)), found.left.power
+    )
     found.stages.append(stage)
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
@@ -212,7 +214,7 @@ def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
         for coordinate in one.lives_in
         for channel in channels
     }
-    curves = curves_over(bench, bench.residuals(current.predictions), homes)
+    curves = curves_over(bench, bench.residuals(current.predictions, drift=True), homes)
     return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
 
 
@@ -242,7 +244,9 @@ def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
 
 def _of_lines(bench: Bench, before: Fit, now: Fit, lines: Sequence[Line]) -> float:
     """Part of the lines of what was left that a fit explains."""
-    last, new = (power_of(bench, bench.residuals(each.predictions), lines) for each in (before, now))
+    last, new = (
+        power_of(bench, bench.residuals(each.predictions, drift=True), lines) for each in (before, now)
+    )
     return float(np.clip(1.0 - new / last, 0.0, 1.0)) if last > 0 else 0.0
 
 
@@ -276,7 +280,7 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, 
             continue
         left = left_of(bench, rest)
         lines: list[Line] = []
-        residuals = bench.residuals(rest.predictions)
+        residuals = bench.residuals(rest.predictions, drift=True)
         for channel in bench.channels:
             lines += order_lines(bench, residuals, channel)
         tell(f"{own.name} again")
@@ -326,10 +330,10 @@ def _clear(one: Named, newest: Named) -> bool:
 
 def left_of(bench: Bench, current: Fit) -> Residual:
     """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
-    numbers = bench.stacked_series()
-    offsets = (numbers[:, None] == np.unique(numbers)[None, :]).astype(float)
     zeros = [column[:, None] for column in unwound(bench, current.state, current.predictions).values()]
     # A delay of a few samples takes little, but without its bounds it would take all that lags.
     own = [k for k in range(current.columns.shape[1]) if k >= len(current.frees) or not current.frees[k].step]
-    columns: Array = np.hstack([current.columns[:, own], offsets, *zeros])
-    return Residual(bench.stacked(bench.residuals(current.predictions)), columns, bench.stacked_blocks())
+    columns: Array = np.hstack([current.columns[:, own], bench.offset_columns(), *zeros])
+    return Residual(
+        bench.stacked(bench.residuals(current.predictions, drift=True)), columns, bench.stacked_blocks()
+    )

@@ -32,7 +32,7 @@ from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit, tie, together
 from hdsim.estimate.state import State, state_of
-from hdsim.estimate.suspect import delays, suspicions
+from hdsim.estimate.suspect import delays, one_way, suspicions
 from hdsim.estimate.thin import readings_of_means
 from hdsim.estimate.write import fitted_numbers
 
@@ -158,7 +158,7 @@ def _diagnosed(
             gap, predictions = gaps(bench, states | {"after": current.state})
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
-    problems += doubts
+    problems += [*doubts, *one_way(bench)]
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)

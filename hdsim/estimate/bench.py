@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.estimate.offsets import offset_columns, offsets_of
 from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.estimate.records import Array, Mask
 
@@ -166,14 +167,9 @@ class Bench:
 
     def trace(self, base: Sequence[Array], there: Sequence[Array]) -> Array:
         """Whitened difference of two sets of predictions, offsets removed, shape (rows,)."""
-        differences = []
-        for series, a, b in zip(self.series, base, there, strict=True):
-            if not len(a):
-                differences.append(np.zeros(0))
-                continue
-            change = b - a
-            differences.append(change - change[series.train].mean() if series.train.any() else change)
-        return self.stacked(differences)
+        changes = [b - a for a, b in zip(base, there, strict=True)]
+        zeros = offsets_of(self.series, changes, drift=False)
+        return self.stacked([change - zero for change, zero in zip(changes, zeros, strict=True)])
 
     def ranges(self, state: State) -> dict[str, float]:
         """What the training records cover, by the names that fittings use.
@@ -273,17 +269,30 @@ class Bench:
         with ThreadPoolExecutor(THREADS) as pool:
             return list(pool.map(one, states))
 
-    def residuals(self, predictions: Sequence[Array]) -> list[Array]:
-        """Measured less predicted, less the mean over the samples that a fit may see (a sensor's offset)."""
-        found = []
-        for series, predicted in zip(self.series, predictions, strict=True):
-            if not len(predicted):
-                found.append(np.zeros(0))
-                continue
-            residual = series.measured - predicted
-            seen = series.train if series.train.any() else series.hold
-            found.append(residual - residual[seen].mean())
-        return found
+    def offsets(self, predictions: Sequence[Array], *, drift: bool = False) -> list[float]:
+        """The sensors' zeros, SI units: what is measured less what is predicted, by ``offsets_of``."""
+        return offsets_of(self.series, self._apart(predictions), drift=drift)
+
+    def residuals(self, predictions: Sequence[Array], *, drift: bool = False) -> list[Array]:
+        """Measured less predicted, less the sensor's zero; empty where nothing is predicted.
+
+        Args:
+            predictions: shape (n,) each.
+            drift: whether zeros may drift between records: where what is missing is judged, not where numbers
+                are fitted, which would be bent by as much as is forgiven.
+        """
+        zeros = self.offsets(predictions, drift=drift)
+        return [apart - zero for apart, zero in zip(self._apart(predictions), zeros, strict=True)]
+
+    def _apart(self, predictions: Sequence[Array]) -> list[Array]:
+        return [
+            s.measured - predicted if len(predicted) else np.zeros(0)
+            for s, predicted in zip(self.series, predictions, strict=True)
+        ]
+
+    def offset_columns(self) -> Array:
+        """What a shift of each sensor's zero does to the rows of ``stacked``, shape (rows, zeros)."""
+        return offset_columns(self.series, self.training)
 
     def block_powers(self, predictions: Sequence[Array]) -> Array:
         """Power of the whitened training residual in each block, shape (blocks,)."""

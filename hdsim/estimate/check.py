@@ -6,6 +6,8 @@ Noise: ``hdsim.estimate.noise``. Spikes and saturation: ``hdsim.estimate.spikes`
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+
 import numpy as np
 
 from hdsim.estimate.data_problems import Check, Problem, Severity
@@ -16,22 +18,47 @@ from hdsim.estimate.spikes import find_spikes, largest_jump, saturated
 
 #: Steps of time longer than this many medians are gaps; from this many seconds on nobody knows the motion.
 GAP, LONGEST_GAP_S = 3.0, 1.0
+#: Standard deviations of its noise by which a channel must vary to tell anything.
+ALIVE = 1.5
 #: Sampling slower than this says little of a drive, Hz.
 SLOWEST_HZ = 10.0
 
 
-def check_record(record: Record, ratio: float) -> Check:
+def check_records(records: Sequence[Record], ratio: float) -> list[Check]:
+    """Check each of a set of records: a torque that stands still in one answers if it differs in others.
+
+    Args:
+        records: their ``trusted`` masks are narrowed in place.
+        ratio: the model's signed ratio motor angle / output angle.
+    """
+    levels: dict[str, list[tuple[float, float]]] = {}
+    for record in records:
+        for channel in record.readable:
+            if channel.endswith("torque"):
+                values, trusted = record.channels[channel], record.trusted[channel]
+                level = float(np.median(values[trusted])), noise_floor(values, trusted)
+                levels.setdefault(channel, []).append(level)
+    alive = {
+        channel
+        for channel, found in levels.items()
+        if np.ptp([level for level, _ in found]) > ALIVE * max(noise for _, noise in found)
+    }
+    return [check_record(record, ratio, alive) for record in records]
+
+
+def check_record(record: Record, ratio: float, alive: Collection[str] = ()) -> Check:
     """Check a record, and take what is not to be trusted out of its masks.
 
     Args:
         record: the record; its ``trusted`` masks are narrowed in place.
         ratio: the model's signed ratio motor angle / output angle.
+        alive: torques that differ between this record and others.
     """
     found = Check()
     _clock(record, found)
     for channel, values in record.channels.items():
         _channel(record, channel, values, found)
-    _still(record, found)
+    _still(record, found, alive)
     compare_channels(record, ratio, found)
     return found
 
@@ -112,7 +139,7 @@ def _channel(record: Record, channel: str, values: Array, found: Check) -> None:
     found.noise[channel] = noise_floor(values, trusted)
 
 
-def _still(record: Record, found: Check) -> None:
+def _still(record: Record, found: Check, alive: Collection[str]) -> None:
     """Say so where nothing moves, or nothing that was measured answers the motion."""
 
     def varies(channel: str) -> bool:
@@ -120,7 +147,7 @@ def _still(record: Record, found: Check) -> None:
         values = record.channels[channel][good]
         if len(values) < 20 or np.ptp(values) == 0.0:
             return False
-        return float(np.std(values)) > 1.5 * found.noise.get(channel, 0.0)
+        return channel in alive or float(np.std(values)) > ALIVE * found.noise.get(channel, 0.0)
 
     motions = ["motor_angle", "output_angle", "load_torque"]
     answers = [

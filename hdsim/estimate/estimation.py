@@ -24,7 +24,7 @@ from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit
 from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
-from hdsim.estimate.suspect import delays, suspicions
+from hdsim.estimate.suspect import delays, one_way, suspicions
 from hdsim.estimate.vector import Vector, sensitivities
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def estimate(
     states = {"before": start, "refit": found.fit.state, "after": found.fit.state}
     gap, predictions = gaps(bench, states)
     problems = [problem for check in checks for problem in check.problems]
-    problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
+    problems += [*suspicions(bench, found, start), *delays(bench, found.intervals), *one_way(bench)]
     own = found.fit.frees
     covariance, names = found.fit.covariance[: len(own), : len(own)], [each.name for each in own]
     matrix = correlations(covariance)
@@ -254,12 +254,9 @@ def _readings(bench: Bench, predictions: Sequence[Array], begins: Sequence[float
         begins: the prescribed motor angle at each record's first sample before the fit, rad.
     """
     found = []
+    zeros = bench.offsets(predictions)
     for k, (predictor, begin) in enumerate(zip(bench.predictors, begins, strict=True)):
-        offsets = {}
-        for series, predicted in zip(bench.series, predictions, strict=True):
-            seen = series.train if series.train.any() else series.hold
-            if series.record == k and len(predicted) and seen.any():
-                offsets[series.channel] = float(np.mean((series.measured - predicted)[seen]))
+        offsets = {s.channel: at for s, at in zip(bench.series, zeros, strict=True) if s.record == k}
         zero = float(predictor.motor_angle[0]) - begin if predictor.plan.locked else None
         found.append(Reading(predictor.record.name, k >= bench.training, offsets, zero))
     return found

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.check import check_record
+from hdsim.estimate.check import check_records
 from hdsim.estimate.data_problems import Check
 from hdsim.estimate.predict import LoadSource, Locked, predictors
 from hdsim.estimate.records import Record, record_from
@@ -35,7 +35,7 @@ def checked(
     )
     if not records:
         raise InputError("no measured record is given")
-    checks = [check_record(record, scenario.drive.ratio) for record in [*records, *held]]
+    checks = check_records([*records, *held], scenario.drive.ratio)
     errors = [problem for check in checks for problem in check.errors]
     if errors and not force:
         lines = "\n".join(f"{p.record}: {p.channel}: {p.kind}: {p.message}" for p in errors)

@@ -23,7 +23,7 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
         states: the three models.
     """
     predictions = {stage: bench.predict(state, everything=True) for stage, state in states.items()}
-    residuals = {stage: bench.residuals(found) for stage, found in predictions.items()}
+    residuals = {stage: bench.residuals(found, drift=True) for stage, found in predictions.items()}
     rng = np.random.default_rng(17)
     result = {}
     for channel in bench.channels:
@@ -57,7 +57,7 @@ def borne_out(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> tuple
         bench: the measured series.
         predictions: of all series, ``refit`` and ``after``.
     """
-    residuals = [bench.residuals(predictions[stage]) for stage in ("refit", "after")]
+    residuals = [bench.residuals(predictions[stage], drift=True) for stage in ("refit", "after")]
     moments, powers = np.zeros(bench.blocks), np.zeros(bench.blocks)
     for series, before, after in zip(bench.series, *residuals, strict=True):
         if not len(before):

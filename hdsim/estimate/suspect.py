@@ -26,6 +26,8 @@ from hdsim.estimate.state import State
 #: model declares its own at its field; a fitted inertia is bent by friction that the model lacks, so its own
 #: part of the torque is looked at instead.
 FAR_CHANNEL = 4.0
+#: Part of the fastest speed below which a motion in the other direction is none: what a spline rings.
+SLOW = 0.02
 #: Least delay that is told, samples.
 LATE = 0.5
 #: Share of a channel's variation that one factor must explain to be evidence, and how near a cause must be.
@@ -76,6 +78,33 @@ def delays(bench: Bench, intervals: Sequence[Interval]) -> list[Problem]:
         )
         found.append(Problem(record.name, one.delay_of, "clock", "info", message))
     return found
+
+
+def one_way(bench: Bench) -> list[Problem]:
+    """Torques that are compared along motions in one direction only.
+
+    Friction that does not change with speed and the sensor's zero are then one number (and a fit leaves them
+    where they are).
+
+    Args:
+        bench: the measured series.
+    """
+    speeds = [p.motor_velocity for p in bench.predictors[: bench.training]]
+    fastest = max(float(np.max(np.abs(speed))) for speed in speeds)
+    back, ahead = (any(np.any(sign * s > SLOW * fastest) for s in speeds) for sign in (-1.0, 1.0))
+    if back == ahead:
+        return []
+    return [
+        Problem(
+            bench.predictors[0].record.name,
+            channel,
+            "one way",
+            "info",
+            "the motion goes one way: Coulomb friction and the sensor's zero are one number in these data",
+        )
+        for channel in bench.channels
+        if channel.endswith("torque")
+    ]
 
 
 def _scales(bench: Bench, before: list[Array]) -> list[Problem]:

@@ -211,7 +211,7 @@ class Findings:
 def gather(diagnosis: Diagnosis) -> Findings:
     """What there is to tell of a diagnosis."""
     bench, verdict = diagnosis.bench, diagnosis.verdict
-    left = {stage: bench.residuals(found) for stage, found in diagnosis.predictions.items()}
+    left = {stage: bench.residuals(found, drift=True) for stage, found in diagnosis.predictions.items()}
     series = []
     for k, one in enumerate(bench.series if left else ()):
         predictor = bench.predictors[one.record]
@@ -263,7 +263,7 @@ def _steps(diagnosis: Diagnosis) -> tuple[Step, ...]:
         effects = tuple(added.effect for added in state.added)
         if not names.issuperset(effects):
             continue
-        residuals = bench.residuals(bench.predict(state, everything=True))
+        residuals = bench.residuals(bench.predict(state, everything=True), drift=True)
         gap = {
             channel: held_out_gap(bench, channel, residuals, np.random.default_rng(17))
             for channel in diagnosis.verdict.gap

@@ -58,7 +58,7 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
     for channel, values in record.channels.items():
         columns["measured"][channel] = Column(values, CHANNELS[channel], "as measured")
     ideal = predictor.motor_angle / predictor.ratio
-    stages = {stage: bench.residuals(found) for stage, found in diagnosis.predictions.items()}
+    stages = {stage: bench.residuals(found, drift=True) for stage, found in diagnosis.predictions.items()}
     for k, series in enumerate(bench.series):
         if series.record != 0:
             continue

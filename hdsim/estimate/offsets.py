@@ -1,0 +1,81 @@
+"""Zeros of the sensors: of a torque one for all records, of an angle one for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hdsim.estimate.records import Array
+
+if TYPE_CHECKING:
+    from hdsim.estimate.bench import Series
+
+#: Standard deviations of a channel's noise by which its zero may move from one record to the next (estimate:
+#: what nobody would see in a record need not be explained).
+DRIFT = 2.0
+
+
+def groups(series: Sequence[Series]) -> list[list[int]]:
+    """Series that share a zero, as their numbers.
+
+    A torque sensor, or a current, has one zero in a campaign: what differs between records at constant speed
+    is friction. Angles count from where each record began to count.
+    """
+    found: dict[tuple[str, int], list[int]] = {}
+    for k, one in enumerate(series):
+        own = one.record if one.channel.endswith("angle") else -1
+        found.setdefault((one.channel, own), []).append(k)
+    return list(found.values())
+
+
+def offsets_of(series: Sequence[Series], values: Sequence[Array], *, drift: bool) -> list[float]:
+    """The zero of every series, of what is measured less predicted or of a change of it.
+
+    The least-squares constant of its group over the samples that a fit may see. A record's own mean lies that
+    far from it as well, up to what a sensor's zero may drift.
+
+    Args:
+        series: all of them.
+        values: shape (n,) each, or (0,) where nothing was predicted.
+        drift: whether zeros may drift; not in a derivative.
+    """
+    found = [0.0] * len(series)
+    for group in groups(series):
+        there = [k for k in group if len(values[k])]
+        means: dict[int, float] = {}
+        common = weights = 0.0
+        for k in there:
+            one = series[k]
+            seen = one.train if one.train.any() else one.hold
+            means[k] = float(values[k][seen].mean()) if seen.any() else 0.0
+            weight = float(one.train.sum()) / one.sigma**2
+            common, weights = common + weight * means[k], weights + weight
+        for k, mean in means.items():
+            if weights == 0.0:
+                found[k] = mean  # only the proof sees this channel
+                continue
+            zero = common / weights
+            bound = DRIFT * series[k].noise if drift else 0.0
+            found[k] = zero + float(np.clip(mean - zero, -bound, bound))
+    return found
+
+
+def offset_columns(series: Sequence[Series], training: int) -> Array:
+    """What a shift of each zero does to the whitened training samples, shape (rows, zeros).
+
+    Args:
+        series: all of them.
+        training: number of the records that fits see.
+    """
+    seen = [k for k, one in enumerate(series) if one.record < training]
+    sizes = {k: int(series[k].train.sum()) for k in seen}
+    columns = []
+    for group in groups(series):
+        if not any(sizes.get(k) for k in group):
+            continue
+        columns.append(
+            np.concatenate([np.full(sizes[k], 1.0 / series[k].sigma if k in group else 0.0) for k in seen])
+        )
+    return np.column_stack(columns)
