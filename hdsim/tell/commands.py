@@ -19,6 +19,7 @@ def diagnose(
     holdout: tuple[Path, ...],
     out: Path,
     load: Any,
+    zeros: Any,
     force: bool,
 ) -> int:
     """Find what a model is missing against measured records.
@@ -33,7 +34,7 @@ def diagnose(
 
     scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
-        found = run(records, scenario, holdout=held, load=load, force=force, on_step=tell)
+        found = run(records, scenario, holdout=held, load=load, zeros=zeros, force=force, on_step=tell)
         tell("finding the next experiment, writing the report")
         told = gather(found)
         report = save(found, model, out, told)
