@@ -5,8 +5,8 @@ import pytest
 from engine_cases import SCENARIO
 
 from hdsim.scenario import Scenario
-from hdsim.study.engine.budget import error_budget, plot_budget
-from hdsim.study.engine.causes import causes
+from hdsim.studies.engine.budget import error_budget, plot_budget
+from hdsim.studies.engine.causes import causes
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 ARCSEC = math.degrees(1) * 3600

@@ -1,0 +1,132 @@
+"""Moves there and back: settling, overshoot and tracking error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hdsim.drive.parameters import Drive
+from hdsim.plot import style
+from hdsim.studies.bench._figure import page, zero_lines
+from hdsim.studies.bench._scenario import bench, with_bearing
+from hdsim.studies.bench._servo import moves_between, position_loop
+from hdsim.studies.known_metrics import find_metric
+from hdsim.studies.metrics._spans import ARCSEC, dwells
+from hdsim.studies.metrics.motion import BAND, overshoot, settling
+from hdsim.studies.registry import BenchRun, Procedure, procedure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from hdsim.scenario import Scenario
+
+
+def build(
+    drive: Mapping[str, Any],
+    *,
+    effects: Mapping[str, Any] | None = None,
+    run: Mapping[str, Any] | None = None,
+    distance_deg: float = 30.0,
+    motor_rpm: float = 2000.0,
+    dwell_s: float = 0.6,
+    load_inertia_kg_m2: float = 0.5,
+    load_torque_nm: float = 0.0,
+    bearing_friction_nm: float = 0.5,
+) -> Scenario:
+    """A move of the output there and back, with dwells.
+
+    Args:
+        drive: section ``drive``.
+        effects: section ``effects``.
+        run: fields of ``run`` that win.
+        distance_deg: of the move.
+        motor_rpm: largest motor speed on the way.
+        dwell_s: rest after each move, long enough to come to rest.
+        load_inertia_kg_m2: inertia of the load.
+        load_torque_nm: constant torque on the load.
+        bearing_friction_nm: Coulomb friction of the output bearing; the effects' own
+            ``load_side_friction`` wins.
+    """
+    made = Drive.model_validate(dict(drive))
+    moves, seconds = moves_between(
+        [distance_deg, 0.0], ratio=made.ratio, motor_rpm=motor_rpm, dwell_s=dwell_s
+    )
+    return bench(
+        drive,
+        position_loop(made, load_inertia_kg_m2, moves),
+        {"inertia_kg_m2": load_inertia_kg_m2, "torque": {"type": "hold", "torque_nm": load_torque_nm}},
+        {"duration_s": seconds, "sample_rate_hz": 2000.0},
+        name="move and settle",
+        effects=with_bearing(effects, bearing_friction_nm),
+        over=run,
+    )
+
+
+def plot(runs: Sequence[BenchRun]) -> Figure:
+    """Motion, tracking error, and the approach of each attained angle with its band."""
+    recording, scenario = runs[0].recording, runs[0].scenario
+    time, angle = recording.time, recording["output_angle"]
+    rests = dwells(recording)
+    rms, largest = (find_metric(f"tracking_error_{k}")(recording, scenario) for k in ("rms", "max"))
+    slowest = max(settling(recording, dwell) for dwell in rests)
+    beyond = ARCSEC * max(overshoot(recording, dwell) for dwell in rests)
+    about = (
+        f"Settles within ±{ARCSEC * BAND:.0f} arcsec of the attained angle {1e3 * slowest:.0f} ms after the "
+        f"end of the command; overshoot {beyond:.1f} arcsec.\n"
+        f"Tracking error {rms:.1f} arcsec rms, {largest:.1f} arcsec at most."
+    )
+    with page("Move and settle", about, recording, 7.2) as figure:
+        motion, error, near = figure.subplots(3, 1)
+        motion.plot(time, np.degrees(angle), color=style.BLUE, label="output")
+        motion.plot(
+            time, np.degrees(recording["reference_angle"]), "--", color=style.ORANGE, label="commanded"
+        )
+        motion.set(ylabel="deg", xlabel="time (s)", title="Output angle", xlim=(0.0, time[-1]))
+        motion.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+        error.plot(time, ARCSEC * recording["tracking_error"], color=style.BLUE)
+        for dwell in rests:
+            error.axvspan(time[dwell.samples.start], time[dwell.samples.stop - 1], color="#EEEEEE", zorder=0)
+        zero_lines(error, vertical=False)
+        error.set(ylabel="arcsec", xlabel="time (s)", xlim=(0.0, time[-1]))
+        error.set_title("Tracking error: output less commanded angle (grey: command at rest)")
+        widest = 0.0
+        for dwell, colour, name in zip(rests, (style.BLUE, style.ORANGE), ("there", "back"), strict=False):
+            since = time[dwell.samples] - time[dwell.samples.start]
+            rest = np.sign(dwell.move) * ARCSEC * (angle[dwell.samples] - dwell.attained(angle))
+            settled = 1e3 * settling(recording, dwell)
+            near.plot(1e3 * since, rest, color=colour, label=f"{name}: settled after {settled:.0f} ms")
+            near.axvline(settled, color=colour, linewidth=0.8, linestyle=":")
+            widest = max(widest, settled)
+        near.axhspan(-ARCSEC * BAND, ARCSEC * BAND, color=style.GREEN, alpha=0.12, linewidth=0)
+        zero_lines(near, vertical=False)
+        near.set(
+            xlim=(0.0, min(1e3 * float(since[-1]), max(3.0 * widest, 100.0))),
+            ylim=(-6 * ARCSEC * BAND, 6 * ARCSEC * BAND),
+            xlabel="time since the end of the command (ms)",
+            ylabel="arcsec",
+        )
+        near.set_title(f"From the attained angle, overshoot upwards (green: ±{ARCSEC * BAND:.0f} arcsec)")
+        near.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    return figure
+
+
+SETTLING = procedure(
+    Procedure(
+        name="settling",
+        title="move and settle",
+        source="ISO 9283:1998, 7.4 and 7.5",
+        build=build,
+        metrics=(
+            "settling_time",
+            "overshoot",
+            "positioning_error",
+            "tracking_error_rms",
+            "tracking_error_max",
+            "motor_torque_rms",
+            "motor_torque_max",
+        ),
+        plot=plot,
+    )
+)
