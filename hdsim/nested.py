@@ -43,7 +43,11 @@ def merge(data: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def copied(value: Any) -> Any:
-    """A copy as dicts and lists all the way down."""
+    """A copy as dicts and lists all the way down; arrays become lists, and parameters what a file has."""
+    if hasattr(value, "model_dump"):
+        return value.model_dump(mode="json")
+    if hasattr(value, "tolist"):
+        return value.tolist()
     if isinstance(value, Mapping):
         return {key: copied(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -49,7 +49,7 @@ class LiveParameters:
             if self._ended is not None:
                 raise InputError(self._too_late(name, value))
             with_all = {**self.values, **self._waiting, name: value}
-            changed(self._scenario, with_all)
+            self._scenario.with_(with_all)
             self._waiting[name] = value
 
     def take(self, run: Run, now: float) -> Callable[[], None] | None:
@@ -86,7 +86,7 @@ class LiveParameters:
 
     def _apply(self, run: Run, waiting: dict[str, float], now: float) -> None:
         try:
-            scenario = changed(self._scenario, {**self.values, **waiting})
+            scenario = self._scenario.with_({**self.values, **waiting})
             exchange(run, scenario)
         except HdsimError as error:
             reason = str(error).splitlines()[0]
@@ -111,28 +111,6 @@ def value_of(scenario: Scenario, name: str) -> float:
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise InputError(f"live.parameters: {name} is no number of this scenario")
     return float(found)
-
-
-def changed(scenario: Scenario, values: dict[str, float]) -> Scenario:
-    """The scenario with other numbers, checked.
-
-    Raises:
-        InputError: a number is out of its bounds.
-    """
-    from pydantic import ValidationError
-
-    data = scenario.model_dump()
-    for name, value in values.items():
-        *path, last = name.split(".")
-        place = data
-        for part in path:
-            place = place[part]
-        place[last] = value
-    try:
-        return type(scenario).model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise InputError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
 
 
 def exchange(run: Run, scenario: Scenario) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -11,8 +12,13 @@ from hdsim.actuation.command import Command
 from hdsim.actuation.loads import Load
 from hdsim.drive.parameters import Drive
 from hdsim.effects import catalogue
+from hdsim.errors import InputError
+from hdsim.nested import copied
 from hdsim.parts import Effect, Parameters
 from hdsim.scenario.extends import read
+from hdsim.scenario.names import check, choices_first, set_value
+from hdsim.scenario.problems import Mark, Problem, ScenarioError
+from hdsim.scenario.reader import Source
 from hdsim.scenario.settings import LiveOptions, LogOptions, Run
 from hdsim.scenario.validation import build
 from hdsim.scenario.writer import to_yaml
@@ -98,8 +104,51 @@ class Scenario(Parameters):
             data[section] = _without_unset(getattr(self, section), data[section])
         return to_yaml(data)
 
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **sections: Any) -> Scenario:
+        """A checked copy with other values; relative paths of files count from the working directory.
+
+        >>> scenario.with_({"load.inertia_kg_m2": 0.3, "effects.output_backlash": {}}, name="with play")
+
+        Args:
+            changes: values by dotted name, as in a study; a mapping replaces a whole section, ``{}`` turns an
+                effect on with its default numbers, None turns it off. Another type, law, model or kind drops
+                the numbers of the one before.
+            sections: the same for names without a dot.
+
+        Raises:
+            hdsim.scenario.ScenarioError: with one line for every name that there is not, with the nearest that
+                there is, and for every value that is not allowed.
+        """
+        data = self.model_dump(mode="json")
+        given = {**(changes or {}), **sections}
+        source = Mark("scenario")
+        problems = []
+        for name in choices_first(given):
+            try:
+                check(name, data, Scenario, lists=True)
+                if name == "drive.preset":
+                    raise InputError(
+                        "the scenario has the old preset's numbers; replace the section: "
+                        f"'drive': {{'preset': {given[name]!r}}}"
+                    )
+                set_value(data, name, copied(given[name]))
+            except InputError as error:
+                problems.append(Problem(source, name, str(error)))
+        if problems:
+            raise ScenarioError(problems)
+        return build(Source(data, {(): source}), Scenario)
+
+    def _repr_html_(self) -> str:
+        from hdsim.notebook import html
+
+        return html(self)
+
     def summary(self) -> str:
         """A few lines on what the scenario describes."""
+        return "\n".join(f"  {title:<9} {line}" for title, line in self.about().items())
+
+    def about(self) -> dict[str, str]:
+        """What the scenario describes: a line for each of its sections."""
         drive, load, run = self.drive, self.load, self.run
         about = self.description.strip().split("\n")[0]
         load_parts = [f"{load.inertia_kg_m2:g} kg m^2"]
@@ -108,7 +157,7 @@ class Scenario(Parameters):
         if load.gravity is not None:
             load_parts.append("gravity arm")
         samples = round(run.duration_s * run.sample_rate_hz)
-        lines = {
+        return {
             "scenario": f"{self.name}: {about}" if about else self.name,
             "drive": f"{drive.preset or 'own numbers'}, ratio {drive.ratio:g}, "
             f"rated torque {drive.rated_torque_nm:g} N m, {drive.mesh.model} mesh",
@@ -118,7 +167,6 @@ class Scenario(Parameters):
             "run": f"{run.duration_s:g} s, method {run.method}, rtol {run.rtol:g}, {samples} samples, "
             f"seed {run.seed}",
         }
-        return "\n".join(f"  {title:<9} {line}" for title, line in lines.items())
 
 
 def _without_unset(model: BaseModel, data: dict[str, Any]) -> dict[str, Any]:

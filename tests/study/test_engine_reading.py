@@ -4,7 +4,7 @@ import pytest
 from engine_cases import AMPLITUDE, METRIC, study
 
 from hdsim.scenario import Scenario, ScenarioError
-from hdsim.studies.engine.names import check, known_names, parse, set_value, unit
+from hdsim.scenario.names import check, known_names, parse, set_value, unit
 from hdsim.studies.engine.reading import load_study, plan
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -69,7 +69,7 @@ def test_effect_that_is_off_is_named(tmp_path):
     (line,) = problems(
         tmp_path, HEAD + "  effects.stribeck_friction.extra_static_nm: {type: list, values: [0.1]}\n"
     )
-    assert "effects.stribeck_friction is off in the base" in line
+    assert "effects.stribeck_friction is off; turn it on" in line
 
 
 def test_unknown_metric_and_procedure_are_refused(tmp_path):

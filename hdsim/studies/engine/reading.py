@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from hdsim.errors import InputError
 from hdsim.scenario.extends import read_tree, resolve_extends
 from hdsim.scenario.fields import split_unit
+from hdsim.scenario.names import check, parse, unit
 from hdsim.scenario.problems import Mark, Problem, ScenarioError, dotted
 from hdsim.scenario.reader import KeyPath, Node, Source, flatten
 from hdsim.scenario.validation import build
 from hdsim.studies.engine.definition import Base, Study
-from hdsim.studies.engine.names import check, parse, unit
 from hdsim.studies.engine.worker import OPTIONS, PRESET, Recipe, remakes_base
 
 if TYPE_CHECKING:

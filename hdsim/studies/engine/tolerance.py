@@ -127,7 +127,7 @@ def find_tolerance(
     Raises:
         InputError: unknown names, or a range that the parameter does not allow.
     """
-    from hdsim.studies.engine.names import get_value
+    from hdsim.scenario.names import get_value
     from hdsim.studies.engine.reading import plan
 
     now = get_value(scenario.model_dump(mode="json"), parameter) if low is None or high is None else None

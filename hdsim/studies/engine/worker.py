@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hdsim.errors import HdsimError, InputError
-from hdsim.studies.engine.names import set_value
+from hdsim.scenario.names import choices_first, set_value
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -50,8 +50,7 @@ class Recipe:
         given = dict(zip(self.names, values, strict=True))
         remade = {name: v for name, v in given.items() if remakes_base(name)}
         data: dict[str, Any] = copy.deepcopy(_base(self.base, self.drive, json.dumps(remade, sort_keys=True)))
-        # A choice of type or law goes first: it drops what belongs to the other choice.
-        for name in sorted(given, key=lambda n: n.rsplit(".", 1)[-1] not in ("type", "law", "model", "kind")):
+        for name in choices_first(given):
             if name not in remade:
                 set_value(data, name, copy.deepcopy(given[name]))
         return data

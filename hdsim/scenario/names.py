@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from typing import Any
 
@@ -68,8 +68,14 @@ def _leaves(value: Any, shape: Shape | None, path: KeyPath) -> Iterator[KeyPath]
         yield path
 
 
-def check(name: str, data: Any, model: Any) -> None:
+def check(name: str, data: Any, model: Any, *, lists: bool = False) -> None:
     """Whether a scenario has the field.
+
+    Args:
+        name: dotted name.
+        data: the scenario as plain data.
+        model: the class ``Scenario``.
+        lists: whether it may be a whole list.
 
     Raises:
         InputError: it has not; the message names the nearest that it has.
@@ -80,7 +86,7 @@ def check(name: str, data: Any, model: Any) -> None:
     for depth, item in enumerate(path):
         if here is None and depth:
             raise InputError(
-                f"found {name!r}, but {dotted(path[:depth])} is off in the base; turn it on there "
+                f"found {name!r}, but {dotted(path[:depth])} is off; turn it on first "
                 f"({dotted(path[:depth])}: {{}})"
             )
         shape = shape.narrowed(here) if shape is not None else None
@@ -91,7 +97,7 @@ def check(name: str, data: Any, model: Any) -> None:
         if not has and (child is None or isinstance(item, int)):
             raise InputError(f"found an unknown parameter, {_suggestion(name, data, model)}")
         here, shape = (here[item] if has else None), child
-    if isinstance(here, list):
+    if isinstance(here, list) and not lists:
         raise InputError(f"found {name!r}, a list of {len(here)}; expected one entry of it, as in {name}[0]")
 
 
@@ -126,6 +132,13 @@ def set_value(data: dict[str, Any], name: str, value: Any) -> None:
     if last in _KINDS and isinstance(here, dict) and here.get(last) != value:
         here.clear()
     here[last] = value
+
+
+def choices_first(names: Mapping[str, Any]) -> list[str]:
+    """Names in the order in which they are set: a choice of type or law drops what belongs to the other choice,
+    so it goes before the numbers of its own; sections go before their fields.
+    """
+    return sorted(names, key=lambda name: (len(parse(name)), name.rsplit(".", 1)[-1] not in _KINDS))
 
 
 def get_value(data: Any, name: str) -> Any:
