@@ -47,12 +47,12 @@ class _Announcer(event.Listener):  # type: ignore[misc]
 event.register("numba:compile", _Announcer())
 
 
-class _Callback(CFunc):  # type: ignore[misc]
+class _Callback(CFunc):
     """A C callback whose compilation is an event, as that of numba's other functions is."""
 
     def _compile_uncached(self) -> Any:
         with event.trigger_event("numba:compile", data={"dispatcher": self}):
-            return super()._compile_uncached()
+            return super()._compile_uncached()  # type: ignore[misc]
 
 
 @cache
