@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import monotonic
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,3 +21,34 @@ def console() -> Console:
 
     found = Console()
     return found if found.is_terminal else Console(width=PIPED_WIDTH)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Tell a terminal, on standard error, what is waited for and for how long already; nothing elsewhere.
+
+    Worker processes say nothing: their parent has the terminal. Where a progress bar has it already, it is a
+    plain line above the bar.
+    """
+    from multiprocessing import parent_process
+
+    if not sys.stderr.isatty() or parent_process() is not None:
+        yield
+    elif hasattr(sys.stderr, "rich_proxied_file"):
+        if what not in _since:
+            print(what, file=sys.stderr)
+        _since.setdefault(what, monotonic())
+        yield
+    else:
+        from rich.console import Console
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            bar.add_task(what, total=None)
+            bar.tasks[0].start_time = _since.setdefault(what, monotonic())
+            yield
+
+
+#: When something was waited for first: it may come in pieces.
+_since: dict[str, float] = {}

@@ -120,6 +120,10 @@ class _Servo(Part):
         if self.sample_period_s is not None:
             build.element(held_torque, [0.0])
             return
+        self.follow(build, self.signal.data)
+
+    def follow(self, build: Builder, reference: SignalData) -> None:
+        """Add the continuous controller on a reference at the side ``at``, of derivative order ``order``."""
         canonical = self.canonical(build.ratio)
         torque = min(self.limit, build.rated_torque_nm / abs(build.ratio))
         states = [
@@ -128,7 +132,7 @@ class _Servo(Part):
             )
             for k, gain in enumerate(canonical.C)
         ]
-        column = build.signal(self.signal.data)
+        column = build.signal(reference)
         build.element(controller_kernel, canonical.pack(column, self.order, self.limit), states=states)
 
 

@@ -1,4 +1,4 @@
-"""Commands about scenarios: ``check``, ``schema``, ``effects``."""
+"""Commands about scenarios: ``check``, ``schema``, ``effects``, ``examples``, ``new``."""
 
 from __future__ import annotations
 
@@ -80,3 +80,37 @@ def effects() -> None:
         table.add_row(name, effect.title, effect.source, orders)
     terminal = console()
     terminal.print(table)
+
+
+@click.command(short_help="List the scenarios that come with hdsim.")
+def examples() -> None:
+    """List the scenarios that come with hdsim, to start from with ``hdsim new``."""
+    from rich.table import Table
+
+    from hdsim.scenario.examples import description
+    from hdsim.scenario.examples import examples as shipped
+
+    table = Table("example", "what it shows")
+    for name, path in shipped().items():
+        table.add_row(name, description(path))
+    console().print(table)
+
+
+@click.command(short_help="Copy an example to start a scenario from.")
+@click.argument("name", required=False)
+@click.argument("out", required=False, type=click.Path(path_type=Path))
+@click.pass_context
+def new(context: click.Context, name: str | None, out: Path | None) -> None:
+    """Copy the example NAME to OUT [default: NAME.yaml], with what it extends and the schema for editors.
+
+    Without NAME the examples are listed.
+    """
+    from hdsim.scenario.examples import copy
+
+    if name is None:
+        context.invoke(examples)
+        return
+    written = copy(name, out)
+    for path in written:
+        click.echo(f"wrote {path}")
+    click.echo(f"next: hdsim check {written[0]}; hdsim run {written[0]}")
