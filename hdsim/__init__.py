@@ -6,6 +6,8 @@
 >>> result["transmission_error"], result.unit("transmission_error")
 >>> result.plot().savefig("seed_move.png")
 >>> result.save("logs/seed_move.mcap")
+>>> heavier = hdsim.simulate(scenario.with_({"load.inertia_kg_m2": 0.8}))
+>>> hdsim.diagnose("log.csv", "base.yaml", mapping="mapping.yaml")
 """
 
 from __future__ import annotations
@@ -17,9 +19,9 @@ from hdsim.errors import HdsimError, InputError, PhysicsError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hdsim.estimate.estimation import estimate as fit
     from hdsim.log import open_log
     from hdsim.log.importing import import_recording
+    from hdsim.notebook.tasks import diagnose, fit, plant, plants, study
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
     from hdsim.simulation.linear import io_system, linearize
@@ -31,25 +33,33 @@ __all__ = [
     "PhysicsError",
     "Recording",
     "Scenario",
+    "diagnose",
     "fit",
     "import_recording",
     "io_system",
     "linearize",
     "load_scenario",
     "open_log",
+    "plant",
+    "plants",
     "simulate",
+    "study",
 ]
 
 # Loaded when first used: importing hdsim imports neither numpy nor numba.
 _HOMES = {
     "Recording": "hdsim.recording",
     "Scenario": "hdsim.scenario",
-    "fit": "hdsim.estimate.estimation:estimate",
+    "diagnose": "hdsim.notebook.tasks",
+    "fit": "hdsim.notebook.tasks",
     "import_recording": "hdsim.log.importing",
     "io_system": "hdsim.simulation.linear",
     "linearize": "hdsim.simulation.linear",
     "open_log": "hdsim.log",
+    "plant": "hdsim.notebook.tasks",
+    "plants": "hdsim.notebook.tasks",
     "simulate": "hdsim.simulation.simulate",
+    "study": "hdsim.notebook.tasks",
 }
 
 
@@ -68,6 +78,9 @@ def __getattr__(name: str) -> Any:
     if name in _HOMES:
         from importlib import import_module
 
-        home, _, own = _HOMES[name].partition(":")
-        return getattr(import_module(home), own or name)
+        return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]

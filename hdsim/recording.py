@@ -14,6 +14,8 @@ from hdsim.errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import pandas
+    import xarray
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -48,6 +50,9 @@ class Table:
     def __len__(self) -> int:
         return len(self.time)
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.columns)
+
 
 @dataclass(frozen=True)
 class Event:
@@ -63,8 +68,9 @@ class Event:
 class Recording:
     """A run: tables by name (``state`` at full rate, ``teeth`` at its own), static arrays, events, metadata.
 
-    ``recording["motor_angle"]`` reads the state table. ``static`` holds what does not change in time
-    (tooth angles, gaps). ``metadata`` maps names to text (scenario, versions, seed, solver, tolerances).
+    ``recording["motor_angle"]``, or ``recording.motor_angle``, reads the state table. ``static`` holds what
+    does not change in time (tooth angles, gaps). ``metadata`` maps names to text (scenario, versions, seed,
+    solver, tolerances).
     """
 
     tables: dict[str, Table]
@@ -97,6 +103,26 @@ class Recording:
     def __iter__(self) -> Iterator[str]:
         return iter(self.state.columns)
 
+    if not TYPE_CHECKING:  # a typo in typed code is still found
+
+        def __getattr__(self, name: str) -> Array:
+            """Values of a channel of the state table, where nothing else has its name."""
+            state = self.__dict__.get("tables", {}).get("state")
+            if state is None or name not in state:
+                raise AttributeError(f"a recording has no channel or attribute {name!r}")
+            return state[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(name for name in self if name.isidentifier())]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
+    def _repr_html_(self) -> str:
+        from hdsim.notebook import recording_html
+
+        return recording_html(self)
+
     def unit(self, name: str) -> str:
         """Unit of a channel of the state table."""
         self.state[name]
@@ -107,6 +133,36 @@ class Recording:
         from hdsim.log import write_log
 
         return write_log(self, path)
+
+    def to_pandas(self, table: str = "state") -> pandas.DataFrame:
+        """A table as a data frame over time (s), for ``hdsim[notebook]``.
+
+        Args:
+            table: its name; of the teeth the columns are (channel, tooth).
+
+        Returns:
+            The frame; ``attrs`` holds ``units`` and ``descriptions`` by column, and the metadata.
+
+        Raises:
+            InputError: there is no such table, or pandas is not installed.
+        """
+        from hdsim.notebook import to_pandas
+
+        return to_pandas(self, table)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """All tables and static arrays as one dataset, for ``hdsim[notebook]``.
+
+        Returns:
+            Variables over ``time``; those of the teeth over ``teeth_time`` and ``tooth``. Each has ``units``
+            and ``long_name``; the metadata are the dataset's attributes.
+
+        Raises:
+            InputError: xarray is not installed.
+        """
+        from hdsim.notebook import to_xarray
+
+        return to_xarray(self)
 
     def plot(self, **options: Any) -> Figure:
         """Draw the one-page figure of the run."""

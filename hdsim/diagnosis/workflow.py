@@ -62,6 +62,11 @@ class Diagnosis:
     start: State
     predictions: dict[str, list[Array]] = field(default_factory=dict)
 
+    def _repr_html_(self) -> str:
+        from hdsim.notebook import diagnosis_html
+
+        return diagnosis_html(self)
+
 
 def diagnose(
     measured: Sequence[Recording | Record],

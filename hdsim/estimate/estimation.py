@@ -27,6 +27,7 @@ from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.vector import Vector, sensitivities
+from hdsim.estimate.write import changed_numbers
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -93,6 +94,16 @@ class Estimation:
         """Numbers whose start lies outside of their interval."""
         return [interval.name for interval in self.intervals if interval.moved]
 
+    @property
+    def changes(self) -> dict[str, float]:
+        """The scenario's numbers that the fit moved, by their paths: for ``Scenario.with_``."""
+        return changed_numbers(self.fit.state, self.refit.freedoms, self.start)
+
+    def _repr_html_(self) -> str:
+        from hdsim.notebook import fit_html
+
+        return fit_html(self)
+
 
 @one_blas_thread()
 def estimate(
@@ -108,7 +119,7 @@ def estimate(
     force: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
-    """Fit a scenario's numbers to measured records; this is ``hdsim.fit``.
+    """Fit a scenario's numbers to measured records; ``hdsim.fit`` takes files too.
 
     The numbers are shared by all records, and so are the torque sensors' zeros (``zeros``); an angle's, and
     that of a locked drive, belong to each.

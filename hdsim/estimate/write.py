@@ -50,12 +50,8 @@ def scenario_text(
         "description": about[1],
         "extends": os.path.relpath(base, beside),
     }
-    for free in freedoms:
-        # A reading has no path: it is the log's, and a gain is written as a sensor's below.
-        for path in free.paths:
-            new, old = number_at(state, path), number_at(start, path)
-            if new is not None and old is not None and new != old:
-                put(data, path, _rounded(new))
+    for path, value in changed_numbers(state, freedoms, start).items():
+        put(data, path, value)
     effects: dict[str, Any] = {}
     for added in state.added:
         known = effects.setdefault(added.effect, _lists(start, added.effect))
@@ -65,6 +61,18 @@ def scenario_text(
     if effects:
         merge(data.setdefault("effects", {}), effects)
     return to_yaml(data)
+
+
+def changed_numbers(state: State, freedoms: Sequence[Free], start: State) -> dict[str, float]:
+    """The base's own numbers that a fit moved, by their paths, with six digits."""
+    found = {}
+    for free in freedoms:
+        # A reading has no path: it is the log's, and a gain is written as a sensor's.
+        for path in free.paths:
+            new, old = number_at(state, path), number_at(start, path)
+            if new is not None and old is not None and new != old:
+                found[path] = _rounded(new)
+    return found
 
 
 def _lists(state: State, name: str) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,14 @@ from hdsim.log.mapping import (
     OutlierMask,
     TorqueChannel,
     _Channel,
+    mapping_of,
     side_of,
 )
 from hdsim.recording import Column, Event, Recording, Table
 
 Array = NDArray[np.float64]
+#: Finds the numbers that a mapping names, by topic.
+Reader = Callable[[Path, Mapping, Sequence[Origin]], dict[str, foreign.Samples]]
 
 UNITS = {"angle": "rad", "velocity": "rad/s", "torque": "N m", "temperature": "degC"}
 _TOLD_GAPS = 50
@@ -34,12 +38,15 @@ _TOLD_GAPS = 50
 WHOLE_TICK = 1.05
 
 
-def import_recording(path: str | Path, mapping: str | Path | Mapping | None = None) -> Recording:
+def import_recording(
+    path: str | Path, mapping: str | Path | dict[str, Any] | Mapping | None = None
+) -> Recording:
     """Read a measured recording into the names and units of our own.
 
     Args:
         path: a CSV, Parquet or MCAP file, or a ROS 2 bag (its folder).
-        mapping: a mapping file, or a mapping; None for a log of hdsim, which needs none.
+        mapping: a mapping's file, the same as a dictionary, or a mapping; None for a log of hdsim, which
+            needs none.
 
     Returns:
         A recording whose ``state`` holds what was measured: ``motor_angle``, ``motor_velocity``,
@@ -60,23 +67,21 @@ def import_recording(path: str | Path, mapping: str | Path | Mapping | None = No
         from hdsim.log.reader import open_log
 
         return open_log(path)
-    if not isinstance(mapping, Mapping):
-        from hdsim.scenario import load_model
-
-        mapping = load_model(mapping, Mapping)
-    return _Import(path, mapping).recording()
+    return Import(path, mapping_of(mapping)).recording()
 
 
-class _Import:
-    """One recording on its way."""
+class Import:
+    """One recording on its way; ``read`` finds numbers as `foreign.read` does."""
 
-    def __init__(self, path: Path, mapping: Mapping) -> None:
+    def __init__(self, path: Path, mapping: Mapping, read: Reader = foreign.read) -> None:
         self.path = path
         self.mapping = mapping
+        self._read = read
         self.events: list[Event] = []
         self._first_ns: int | None = None
 
     def recording(self) -> Recording:
+        """The whole recording."""
         mapping = self.mapping
         given = mapping.channels.given()
         time, raw = self._samples(given)
@@ -104,7 +109,7 @@ class _Import:
         if clock.column is not None or clock.field is not None:
             time_origin = Origin(column=clock.column, topic=clock.topic, field=clock.field)
             wanted.append(time_origin)
-        found = foreign.read(self.path, mapping, list(dict.fromkeys(wanted)))
+        found = self._read(self.path, mapping, list(dict.fromkeys(wanted)))
         lead = clock.topic or next(iter(origins.values())).topic or ""
         if lead not in found:
             raise InputError(f"{self.path}: the time's topic {lead!r} gives no channel: name a field of it")
@@ -238,7 +243,7 @@ class _Import:
             "start_of_time": f"{start!r} s" if self._first_ns is None else f"{self._first_ns} ns since 1970",
             "gaps": json.dumps(gaps),
         }
-        if self.path.is_file():
+        if self._read is foreign.read and self.path.is_file():
             with open(self.path, "rb") as file:
                 found["source_sha256"] = hashlib.file_digest(file, "sha256").hexdigest()
         if self.mapping.ratio is not None:

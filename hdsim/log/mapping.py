@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -314,3 +315,23 @@ class Mapping(Parameters):
 def side_of(channel: str) -> Side:
     """Side of the gear on which a channel of the contract is."""
     return "motor" if channel.startswith("motor") else "output"
+
+
+def mapping_of(given: str | Path | dict[str, Any] | Mapping) -> Mapping:
+    """A mapping from its file, from the same as a dictionary, or as it is.
+
+    Raises:
+        hdsim.scenario.ScenarioError: with one line for every mistake.
+    """
+    if isinstance(given, Mapping):
+        return given
+    from hdsim.scenario import load_model
+
+    if not isinstance(given, dict):
+        return load_model(given, Mapping)
+    from hdsim.nested import copied
+    from hdsim.scenario.problems import Mark
+    from hdsim.scenario.reader import Source
+    from hdsim.scenario.validation import build
+
+    return build(Source(copied(given), {(): Mark("mapping")}), Mapping)

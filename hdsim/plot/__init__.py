@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hdsim.plot.bode import plot_bode as plot_bode
     from hdsim.plot.page import plot_recording as plot_recording
+    from hdsim.plot.page import plot_strip as plot_strip
 
-_HOME = {"plot_bode": "bode", "plot_recording": "page"}
+_HOME = {"plot_bode": "bode", "plot_recording": "page", "plot_strip": "page"}
 
 __all__ = sorted(_HOME)
 

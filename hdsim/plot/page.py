@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from hdsim.recording import Recording
 
+#: Width and height in inches of a row of panels.
+STRIP = (11.0, 2.4)
 #: Panels over time up to which they stand in one column.
 _ONE_COLUMN = 3
 
@@ -53,6 +55,39 @@ def plot_recording(recording: Recording, *, size_in: tuple[float, float] = style
         for axes, panel in _arrange(figure, recording, timed, others):
             panel.draw(axes)
             axes.set_title(panel.title)
+    return figure
+
+
+def plot_strip(recording: Recording, *, panels: int = 3, size_in: tuple[float, float] = STRIP) -> Figure:
+    """Draw the first panels of a run over time side by side, without title and footer.
+
+    Args:
+        recording: a simulated, measured or replayed run.
+        panels: how many at most.
+        size_in: width and height in inches; of fewer panels the width is less.
+
+    Raises:
+        InputError: nothing in it can be drawn.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    chosen = time_panels(recording)[:panels] if len(recording.time) else []
+    if not chosen:
+        raise InputError("nothing to draw over time")
+    clock = units.for_duration(float(recording.time[-1]))
+    with rc_context(style.STYLE):
+        width, height = size_in
+        size = (width * max(len(chosen) / panels, 0.5), height)
+        figure = Figure(figsize=size, dpi=style.DPI, layout="constrained")
+        for axes, panel in zip(figure.subplots(1, len(chosen), squeeze=False)[0], chosen, strict=True):
+            panel.draw(axes)
+            axes.set_title(panel.title)
+            axes.set_xlabel(f"time ({clock.name})")
+            legend = axes.get_legend()
+            if legend is not None:
+                # Beside the title there is no room in a narrow panel.
+                axes.legend(loc="best", fontsize=7.5)
     return figure
 
 

@@ -116,7 +116,8 @@ class Scenario(Parameters):
             sections: the same for names without a dot.
 
         Raises:
-            hdsim.scenario.ScenarioError: with one line for every name that there is not, with the nearest that
+            hdsim.scenario.ScenarioError: with one line for every name that there is not, with the nearest
+            that
                 there is, and for every value that is not allowed.
         """
         data = self.model_dump(mode="json")
@@ -139,9 +140,9 @@ class Scenario(Parameters):
         return build(Source(data, {(): source}), Scenario)
 
     def _repr_html_(self) -> str:
-        from hdsim.notebook import html
+        from hdsim.notebook import scenario_html
 
-        return html(self)
+        return scenario_html(self)
 
     def summary(self) -> str:
         """A few lines on what the scenario describes."""

@@ -135,8 +135,8 @@ def set_value(data: dict[str, Any], name: str, value: Any) -> None:
 
 
 def choices_first(names: Mapping[str, Any]) -> list[str]:
-    """Names in the order in which they are set: a choice of type or law drops what belongs to the other choice,
-    so it goes before the numbers of its own; sections go before their fields.
+    """Names in the order in which they are set: sections before their fields, and before a choice's numbers
+    the choice of type or law, which drops those of the other choice.
     """
     return sorted(names, key=lambda name: (len(parse(name)), name.rsplit(".", 1)[-1] not in _KINDS))
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import control
 
     from hdsim.scenario import Scenario
+    from hdsim.simulation.inputs import MotorInput, OutputInput
 
 Array = NDArray[np.float64]
 
@@ -152,39 +153,70 @@ def close_loop(scenario: Scenario, plant: control.StateSpace) -> control.StateSp
     )
 
 
-def io_system(scenario: Scenario, *, outputs: tuple[str, ...] = OUTPUTS, time: float = 0.0) -> Any:
+def io_system(
+    scenario: Scenario,
+    *,
+    dt_s: float | None = None,
+    motor: MotorInput = "torque",
+    output: OutputInput = "torque",
+    outputs: tuple[str, ...] | None = None,
+    time: float = 0.0,
+) -> Any:
     """The nonlinear drive as a block for ``control.interconnect`` and ``control.input_output_response``.
 
-    The compiled right-hand side of the simulation, driven by a motor torque and an external torque on the
-    output instead of the scenario's command and load torque. Its states are those of the simulation: ring
-    and output as deviations from the ideal gear, so that tolerances mean the same after many turns.
+    With ``dt_s`` it is a block in discrete time: a step of the compiled integrator from sample to sample,
+    with inputs held between them, for controllers that are sampled too. Without, it is the compiled
+    right-hand side in continuous time, which ``control`` integrates itself, and friction is smoothed as in
+    ``linearize``; the block in discrete time sticks like a run. Both are driven by a motor torque and an
+    external torque on the output instead of the scenario's command and load torque; in discrete time either
+    side may be moved instead. The states are those of the simulation: ring and output as deviations
+    from the ideal gear, so that tolerances mean the same after many turns.
 
     Args:
         scenario: the drive with effects, inertia and gravity.
-        outputs: as for ``linearize``.
+        dt_s: time between two samples, s; continuous time when None.
+        motor: input on the motor's side, as for ``SteppedPlant``; only ``torque`` in continuous time.
+        output: input on the output's side: ``torque``, or ``motion``: ``prescribed_output_angle``,
+            ``_velocity`` and ``_acceleration``; only ``torque`` in continuous time.
+        outputs: as for ``linearize``, in discrete time any of ``SteppedPlant.outputs``; ``OUTPUTS``, as far
+            as they are no inputs, when None.
         time: offset of the block's time against the scenario's, for a prescribed output, s.
 
     Returns:
-        A ``control.NonlinearIOSystem`` with the inputs ``motor_torque`` and ``load_torque``, N m.
+        A ``control.NonlinearIOSystem`` with the inputs ``motor_torque`` and ``load_torque``, N m, or those of
+        the motions, rad, rad/s and rad/s².
 
     Raises:
-        InputError: an output that there is not.
+        InputError: an output that there is not, or a motion in continuous time.
     """
+    chosen = OUTPUTS if outputs is None else tuple(outputs)
+    if dt_s is not None:
+        from hdsim.simulation.sampled_block import sampled_block
+
+        if not 0.0 < dt_s < np.inf:
+            raise InputError(f"dt_s: found {dt_s!r}, expected a positive time")
+        return sampled_block(
+            scenario, dt_s, motor=motor, output=output, outputs=chosen, time=time, name=_name(scenario)
+        )
+    if (motor, output) != ("torque", "torque"):
+        raise InputError(
+            "a side that is moved needs dt_s: the block in continuous time has torques as inputs"
+        )
     import control as ct
 
-    plant = Plant(scenario, tuple(outputs))
+    plant = Plant(scenario, chosen)
 
     def update(t: float, x: Array, u: Array, _: Any) -> Array:
         return plant.rates(time + t, np.asarray(x, dtype=float), np.asarray(u, dtype=float))
 
-    def output(t: float, x: Array, u: Array, _: Any) -> Array:
+    def output_at(t: float, x: Array, u: Array, _: Any) -> Array:
         return plant.values(time + t, np.asarray(x, dtype=float), np.asarray(u, dtype=float))
 
     return ct.nlsys(
         update,
-        output,
+        output_at,
         inputs=list(INPUTS),
-        outputs=list(outputs),
+        outputs=list(chosen),
         states=plant.state_names(absolute=False),
         name=_name(scenario),
     )

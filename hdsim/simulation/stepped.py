@@ -70,6 +70,12 @@ class SteppedPlant:
         inputs: name and unit of every input.
         outputs: name and unit of every output; those of ``Observer.formulas`` that are no input.
         about: one line on every input and output.
+        formulas: how every output follows from the compiled code's numbers.
+        places: the inputs, and where their numbers stand in the model's.
+        rtol: relative tolerance.
+        atol: absolute tolerance, a number or shape (n,).
+        longest_step_s: longest step of the integrator, s.
+        guard: the speed that gives a step up.
 
     Raises:
         InputError: the scenario has no such command, or its controller is sampled.
@@ -91,12 +97,12 @@ class SteppedPlant:
             audited=False,
         )
         self._observer = Observer(self.model)
-        self._guard = speed_guard(self.model)
-        self._places = [one.place(self.model) for one in self._given]
-        self._rtol = scenario.run.rtol
+        self.guard = speed_guard(self.model)
+        self.places = [(one, one.place(self.model)) for one in self._given]
+        self.rtol = scenario.run.rtol
         atol = scenario.run.atol
-        self._atol = self._rtol * self.model.system.scale if atol is None else atol
-        self._longest = math.inf if scenario.run.max_step_s is None else scenario.run.max_step_s
+        self.atol = self.rtol * self.model.system.scale if atol is None else atol
+        self.longest_step_s = math.inf if scenario.run.max_step_s is None else scenario.run.max_step_s
         start = scenario.run.start
         y0 = self.model.initial_state(
             motor_angle=start.motor_angle_rad,
@@ -104,10 +110,10 @@ class SteppedPlant:
             output_twist=start.output_twist_rad,
         )
         self.inputs = {name: unit for one in self._given for name, unit in one.units.items()}
-        formulas = {n: f for n, f in self._observer.formulas.items() if n not in self.inputs}
-        self.outputs = {name: formula.unit for name, formula in formulas.items()}
+        self.formulas = {n: f for n, f in self._observer.formulas.items() if n not in self.inputs}
+        self.outputs = {name: formula.unit for name, formula in self.formulas.items()}
         self.about = {one.names[0]: one.about for one in self._given}
-        self.about |= {name: formula.description for name, formula in formulas.items()}
+        self.about |= {name: formula.description for name, formula in self.formulas.items()}
         self._start = SteppedState(0.0, y0, None, dict.fromkeys(self.inputs, 0.0))
         self.reset()
 
@@ -152,12 +158,12 @@ class SteppedPlant:
             np.array([t0, t1]),
             self._y,
             np.zeros(0),
-            rtol=self._rtol,
-            atol=self._atol,
+            rtol=self.rtol,
+            atol=self.atol,
             inside_at=layout.INSIDE,
-            guard=self._guard,
+            guard=self.guard,
             first_step=self._step,
-            max_step=self._longest,
+            max_step=self.longest_step_s,
         )
         if not found.success:
             raise RunFailed(told(self.model, found))
@@ -202,7 +208,7 @@ class SteppedPlant:
                 slopes[name] = 0.0 if dt_s is None else (end - first) / dt_s
             last[name] = end
         reals = self.model.system.reals
-        for given, (start, row) in zip(self._given, self._places, strict=True):
+        for given, (start, row) in self.places:
             numbers = [last[name] for name in given.names]
             name = given.names[0]
             if name in slopes:

@@ -16,6 +16,8 @@ from hdsim.studies.engine.table import StudyTable, study_table
 from hdsim.studies.engine.worker import Job
 
 if TYPE_CHECKING:
+    import pandas
+
     from hdsim.studies.engine.worker import Row
 
 #: Name of the file that grows while the study runs.
@@ -37,6 +39,21 @@ class StudyResult:
     table: StudyTable
     made: int
     seconds: float
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """All runs as a data frame, a row each, for ``hdsim[notebook]``; ``attrs`` holds ``units`` by column.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        from hdsim.notebook import study_to_pandas
+
+        return study_to_pandas(self.table)
+
+    def _repr_html_(self) -> str:
+        from hdsim.notebook import study_html
+
+        return study_html(self)
 
 
 def run_study(
