@@ -35,7 +35,7 @@ from hdsim.estimate.refit import Refit, refit, tie, together
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.thin import readings_of_means
-from hdsim.estimate.write import fitted_numbers
+from hdsim.estimate.write import fitted_numbers, scenario_changes
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -61,6 +61,14 @@ class Diagnosis:
     final: Fit
     start: State
     predictions: dict[str, list[Array]] = field(default_factory=dict)
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """What was fitted and what was added, for ``Scenario.with_``; not the gain of a torque's reading."""
+        state = self.final.state
+        effects = state.merged_effects()
+        own = scenario_changes(state, self.refit.freedoms, self.start)
+        return {f"effects.{one.effect}": effects[one.effect] for one in state.added} | own
 
     def _repr_html_(self) -> str:
         from hdsim.notebook import diagnosis_html

@@ -27,7 +27,7 @@ from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.vector import Vector, sensitivities
-from hdsim.estimate.write import changed_numbers
+from hdsim.estimate.write import scenario_changes
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -97,7 +97,7 @@ class Estimation:
     @property
     def changes(self) -> dict[str, float]:
         """The scenario's numbers that the fit moved, by their paths: for ``Scenario.with_``."""
-        return changed_numbers(self.fit.state, self.refit.freedoms, self.start)
+        return scenario_changes(self.fit.state, self.refit.freedoms, self.start)
 
     def _repr_html_(self) -> str:
         from hdsim.notebook import fit_html

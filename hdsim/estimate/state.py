@@ -131,6 +131,19 @@ class State:
         Raises:
             PredictionError: a coefficient is outside its effect's bounds.
         """
+        effects = self.merged_effects()
+        for name, effect in effects.items():
+            if isinstance(effect, Table):
+                # A curve over time begins with the record, after the lead-in.
+                effects[name] = effect.delayed(LEAD_IN_S)
+        return Candidate(self.drive, effects, self.load, self.seed)
+
+    def merged_effects(self) -> dict[str, Any]:
+        """The base's effects and those that were added, by name.
+
+        Raises:
+            PredictionError: a coefficient is outside its effect's bounds.
+        """
         effects = dict(self.effects)
         known = catalogue()
         merged: dict[str, dict[str, Any]] = {}
@@ -143,11 +156,7 @@ class State:
                 effects[name] = known[name](**settings)
             except ValidationError as error:
                 raise PredictionError(str(error)) from None
-        for name, effect in effects.items():
-            if isinstance(effect, Table):
-                # A curve over time begins with the record, after the lead-in.
-                effects[name] = effect.delayed(LEAD_IN_S)
-        return Candidate(self.drive, effects, self.load, self.seed)
+        return effects
 
 
 def state_of(scenario: Scenario) -> State:

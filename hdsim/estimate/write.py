@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,12 @@ def changed_numbers(state: State, freedoms: Sequence[Free], start: State) -> dic
             if new is not None and old is not None and new != old:
                 found[path] = _rounded(new)
     return found
+
+
+def scenario_changes(state: State, freedoms: Sequence[Free], start: State) -> dict[str, float]:
+    """`changed_numbers` by the names that ``Scenario.with_`` knows, ``components[0]`` for ``components.0``."""
+    found = changed_numbers(state, freedoms, start)
+    return {re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", path): value for path, value in found.items()}
 
 
 def _lists(state: State, name: str) -> dict[str, Any]:

@@ -125,12 +125,12 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     """A diagnosis: verdict, how sure it is, the numbers of what was found, and the gap on unseen data."""
     from hdsim.tell.figures import gap_bars, gap_figure
     from hdsim.tell.findings import gather
-    from hdsim.tell.wording import KINDS, headline, meaning, sureness
+    from hdsim.tell.wording import KINDS, headline, sureness
 
     found = gather(diagnosis)
     verdict = found.verdict
     sure = sureness(found)
-    facts = {"how sure": sure.sentence, "what it means": meaning(found)}
+    facts = {"how sure": sure.sentence}
     serious = [f"{p.record}: {p.channel} {p.message}" for p in verdict.data_problems if p.severity != "info"]
     if serious:
         facts["data"] = "; ".join(serious)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hdsim.recording import Recording
 
 #: Width and height in inches of a row of panels.
-STRIP = (11.0, 2.4)
+STRIP = (11.0, 2.6)
 #: Panels over time up to which they stand in one column.
 _ONE_COLUMN = 3
 
@@ -87,7 +87,7 @@ def plot_strip(recording: Recording, *, panels: int = 3, size_in: tuple[float, f
             legend = axes.get_legend()
             if legend is not None:
                 # Beside the title there is no room in a narrow panel.
-                axes.legend(loc="best", fontsize=7.5)
+                axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.26), ncols=3)
     return figure
 
 

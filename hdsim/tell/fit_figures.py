@@ -35,7 +35,7 @@ def intervals_figure(found: Estimation) -> Figure | None:
         if values.max() / values.min() > 4.0:
             axes.set_xscale("log")
         axes.set_yticks(range(len(shown)), [named_number(i.name)[0] for i in shown])
-        axes.invert_yaxis()
+        axes.set_ylim(len(shown) - 0.5, -0.5)
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("fitted value over the model's (95 % interval; orange: the model's lies outside)")
     return figure

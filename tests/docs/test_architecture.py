@@ -13,8 +13,12 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 MOST_LINES = 350
-#: ``Recording.save`` and ``Recording.plot``: conveniences that look to the right, when they are called.
-ALLOWED = {("recording", "log"), ("recording", "plot")}
+#: ``Recording.save``, ``plot`` and what notebooks show: conveniences that look to the right, when they are called.
+ALLOWED = {
+    ("recording", "log"),
+    ("recording", "plot"),
+    *((room, "notebook") for room in ("recording", "scenario", "studies", "estimate", "diagnosis")),
+}
 
 
 def module_name(path: Path) -> str:
