@@ -77,7 +77,7 @@ def changed_numbers(state: State, freedoms: Sequence[Free], start: State) -> dic
 
 
 def scenario_changes(state: State, freedoms: Sequence[Free], start: State) -> dict[str, float]:
-    """`changed_numbers` by the names that ``Scenario.with_`` knows, ``components[0]`` for ``components.0``."""
+    """`changed_numbers` by the names of ``Scenario.with_``: ``components[0]`` for ``components.0``."""
     found = changed_numbers(state, freedoms, start)
     return {re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", path): value for path, value in found.items()}
 

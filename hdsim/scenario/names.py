@@ -15,6 +15,7 @@ from hdsim.scenario.reader import KeyPath
 _PART = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)((?:\[[0-9]+\])*)")
 #: Keys that choose which other keys a mapping has; setting one drops the others.
 _KINDS = ("type", "law", "model", "kind")
+_DEFAULT = object()
 
 
 def parse(name: str) -> KeyPath:
@@ -96,7 +97,8 @@ def check(name: str, data: Any, model: Any, *, lists: bool = False) -> None:
         )
         if not has and (child is None or isinstance(item, int)):
             raise InputError(f"found an unknown parameter, {_suggestion(name, data, model)}")
-        here, shape = (here[item] if has else None), child
+        # What is not written has its default: only its shape is known.
+        here, shape = (here[item] if has else _DEFAULT), child
     if isinstance(here, list) and not lists:
         raise InputError(f"found {name!r}, a list of {len(here)}; expected one entry of it, as in {name}[0]")
 

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 MOST_LINES = 350
-#: ``Recording.save``, ``plot`` and what notebooks show: conveniences that look to the right, when they are called.
+#: ``Recording.save``, ``plot`` and what notebooks show: they look to the right, when called.
 ALLOWED = {
     ("recording", "log"),
     ("recording", "plot"),

@@ -1,4 +1,4 @@
-"""The task of a researcher in a notebook: the notebook of the documentation in a real kernel, first cell to last."""
+"""The task of a researcher in a notebook: that of the documentation in a real kernel, first cell to last."""
 
 from __future__ import annotations
 
