@@ -43,7 +43,9 @@ def test_a_sampled_block_tends_to_the_block_in_continuous_time():
     exact = response(None)
     coarse, fine = (np.abs(response(dt) - exact).max() for dt in (1e-3, 2e-4))
     assert fine < coarse / 4.0
-    assert fine < 2e-3 * np.abs(exact).max()
+    # Held over a period, an input comes half a period late on the average: the motion is late by no more.
+    fastest = np.abs(np.diff(exact)).max() / 1e-3
+    assert fine < 0.5 * 2e-4 * fastest
 
 
 def test_a_sampled_block_can_have_its_output_moved():
