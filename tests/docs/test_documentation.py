@@ -160,6 +160,18 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert list(tmp_path.glob("logs/*.png"))
 
 
+@pytest.mark.parametrize("page", ["python", "linearize"])
+def test_the_python_of_a_page_runs(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    space: dict[str, Any] = {}
+    for example in blocks(DOCS / f"{page}.md", "python"):
+        exec(compile(example, f"{page}.md", "exec"), space)
+    if page == "python":
+        assert space["done"].shape == (8,)
+    else:
+        assert space["response"].outputs.shape == (1, 201)
+
+
 def test_the_effect_that_the_documentation_adds_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
