@@ -3,7 +3,7 @@
     python benchmarks/many_records.py [RECORDS]
 
 Each record is a swing of its own of a joint with Stribeck friction and a torque ripple, 4 s at 1 kHz, written
-down here with NumPy; the model is a rigid drive without either. Each case runs in a process of its own and has
+down here with NumPy; the model is a rigid drive without either. Each case runs in its own process and has
 its own peak memory; "of proportion" is below 1 where a record among many costs less than one alone.
 """
 
