@@ -44,5 +44,7 @@ def test_the_age_of_a_torque_is_told_by_the_order_that_it_blurs(late):
 def test_a_torque_without_lines_has_no_age():
     time = np.arange(6000) * 1e-3
     angle = 60.0 * (1 - np.cos(0.5 * np.pi * time))
-    torque = 0.01 * np.sign(np.sin(0.5 * np.pi * time)) + 0.01 * np.random.default_rng(2).standard_normal(6000)
+    torque = 0.01 * np.sign(np.sin(0.5 * np.pi * time)) + 0.01 * np.random.default_rng(2).standard_normal(
+        6000
+    )
     assert age_by_lines(bench_of(time, angle, torque), [torque], "motor_torque") == 0.0
