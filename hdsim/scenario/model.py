@@ -13,7 +13,8 @@ from hdsim.drive.parameters import Drive
 from hdsim.effects import catalogue
 from hdsim.parts import Effect, Parameters
 from hdsim.scenario.extends import read
-from hdsim.scenario.settings import LiveOptions, LogOptions, Run
+from hdsim.scenario.reader import flatten, parse
+from hdsim.scenario.settings import Evaluation, LiveOptions, LogOptions, Run
 from hdsim.scenario.validation import build
 from hdsim.scenario.writer import to_yaml
 
@@ -61,6 +62,8 @@ class Scenario(Parameters):
     """What hangs on the output."""
     run: Run
     """How the model is integrated and sampled."""
+    evaluation: Evaluation = Evaluation()
+    """What the run's numbers are held against."""
     log: LogOptions = LogOptions()
     """What the log contains."""
     live: LiveOptions = LiveOptions()
@@ -91,10 +94,23 @@ class Scenario(Parameters):
             source.data["name"] = Path(path).stem[:200]
         return build(source, cls)
 
+    @classmethod
+    def from_text(cls, text: str, name: str = "scenario.yaml") -> Scenario:
+        """The scenario that ``to_yaml`` wrote, as every log keeps it.
+
+        Args:
+            text: YAML that extends nothing.
+            name: where errors say that it stands.
+
+        Raises:
+            hdsim.scenario.ScenarioError: with one line for every mistake.
+        """
+        return build(flatten(parse(text, name)), cls)
+
     def to_yaml(self) -> str:
         """The whole scenario as YAML: defaults, presets and extended files resolved, paths absolute."""
         data = self.model_dump(mode="json")
-        for section in ("effects", "command", "load", "run", "log", "live"):
+        for section in ("effects", "command", "load", "run", "evaluation", "log", "live"):
             data[section] = _without_unset(getattr(self, section), data[section])
         return to_yaml(data)
 

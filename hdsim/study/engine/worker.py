@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import copy
 import json
-import math
 import time
 import warnings
 from collections.abc import Sequence
@@ -210,21 +209,19 @@ def record(scenario: Scenario, log: Path | None = None) -> tuple[Recording, str]
 
 
 def measured(names: Sequence[str], recording: Recording, scenario: Scenario) -> tuple[dict[str, float], str]:
-    """Metrics of a run, and why those that are missing could not be taken."""
-    from hdsim.study.known_metrics import find_metric
+    """Metrics of a run (a time that never comes is infinite), and why those that are missing could not be
+    taken.
+    """
+    from hdsim.study.run_metrics import RunMetrics
 
+    found = RunMetrics(recording, scenario)
     values: dict[str, float] = {}
     reasons: list[str] = []
     for name in names:
         try:
-            value = float(find_metric(name)(recording, scenario))
+            values[name] = found[name].value
         except HdsimError as error:
             reasons.append(f"{name}: {error}")
-        else:
-            if math.isfinite(value):
-                values[name] = value
-            else:
-                reasons.append(f"{name}: found {value}, expected a finite number")
     return values, "; ".join(reasons)
 
 
