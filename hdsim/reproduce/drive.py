@@ -121,7 +121,7 @@ def positioning() -> Budget:
     scenario = find_procedure("positioning").build(
         _drive({}), effects=_EFFECTS, cycles=2, targets=4, load_torque_nm=LOAD_NM, run={"rtol": 1e-4}
     )
-    return error_budget(scenario)
+    return error_budget(scenario, shares=False)
 
 
 @cache

@@ -46,7 +46,7 @@ def bench(
             click.echo(f"{one.name}: {one.title} ({one.source})")
             click.echo(f"    {', '.join(one.metrics)}")
         return 0
-    name, section, effects, run, lines = _drive(drive)
+    name, section, effects, run, lines = benched(drive)
     if seed is not None:
         run["seed"] = seed
     folder = Path("bench") / name if output is None else output
@@ -130,7 +130,7 @@ def presets(name: str | None) -> None:
     console().print(table)
 
 
-def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any], dict[str, Line]]:
+def benched(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any], dict[str, Line]]:
     """Name, sections ``drive`` and ``effects``, fields of ``run``, and the catalogue's lines.
 
     Raises:

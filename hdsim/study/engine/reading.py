@@ -34,7 +34,7 @@ class Plan:
 
     Args:
         study: what the user wrote.
-        scenario: the base scenario (its seed is replaced in every run).
+        scenario: the base scenario; its seed is that of the first drive.
         recipe: how to make the scenario of a run.
         runs: all runs, by index.
         metrics: what is measured.
@@ -121,7 +121,7 @@ def plan(study: Study, source: Source | None = None) -> Plan:
             with _collected(problems, source, ("parameters", name)):
                 check(name, complete, Scenario)
     if not problems:
-        found = runs(study)
+        found = runs(study, scenario.run.seed)
         _check_values(study, recipe, found, source, problems)
     if problems:
         raise ScenarioError(sorted(problems, key=lambda problem: problem.mark.line))
@@ -162,7 +162,7 @@ def base_recipe(base: Base, names: tuple[str, ...], source: Source) -> tuple[Sce
     }
     recipe = Recipe(json.dumps(given), "{}", names)
     try:
-        built = Recipe(recipe.base, "{}", ()).scenario((), 0)
+        built = Recipe(recipe.base, "{}", ()).scenario(())
     except ScenarioError as error:
         raise ScenarioError(
             Problem(source.mark(("base",)), f"base: {problem.field}", problem.text)
@@ -222,7 +222,7 @@ def _mistake(single: Recipe, name: str, value: Any) -> str:
     Whether it fits the other parameters is known only in the run, whose row then holds the reason.
     """
     try:
-        single.scenario((value,), 0)
+        single.scenario((value,))
     except ScenarioError as error:
         own = [p.text for p in error.problems if p.field.startswith(name) or remakes_base(name)]
         return own[0] if own else ""

@@ -55,12 +55,12 @@ class Recipe:
                 set_value(data, name, copy.deepcopy(given[name]))
         return data
 
-    def scenario(self, values: Sequence[Any], seed: int, source: str = "run") -> Scenario:
+    def scenario(self, values: Sequence[Any], seed: int | None = None, source: str = "run") -> Scenario:
         """The scenario of a run.
 
         Args:
             values: one for every name.
-            seed: seed of the run, unless ``run.seed`` is a parameter.
+            seed: seed of the run, unless ``run.seed`` is a parameter; the base's own when None.
             source: where errors say that the scenario comes from.
 
         Raises:
@@ -72,7 +72,7 @@ class Recipe:
         from hdsim.scenario.validation import build
 
         data = self.data(values)
-        if "run.seed" not in self.names:
+        if seed is not None and "run.seed" not in self.names:
             data.setdefault("run", {})["seed"] = seed
         return build(Source(data, {(): Mark(source)}), Scenario)
 
