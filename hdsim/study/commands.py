@@ -138,11 +138,11 @@ def benched(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, 
     """
     from hdsim.drive.presets import catalogue_figures, preset_names
     from hdsim.errors import InputError
-    from hdsim.study.bench.report import catalogue_lines, default_effects
+    from hdsim.study.bench.report import CATALOGUE_EFFECTS, catalogue_lines
 
     if given in preset_names():
         section = {"preset": given}
-        return given, section, default_effects(section), {}, catalogue_lines(catalogue_figures(given))
+        return given, section, dict(CATALOGUE_EFFECTS), {}, catalogue_lines(catalogue_figures(given))
     path = Path(given)
     if not path.exists():
         try:

@@ -13,7 +13,7 @@ from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
 from hdsim.simulation.simulate import simulate
 from hdsim.study.bench import frequency, friction, positioning, settling, torsion, transmission
-from hdsim.study.bench.report import catalogue_lines, default_effects, figures_of, run_procedure
+from hdsim.study.bench.report import CATALOGUE_EFFECTS, catalogue_lines, figures_of, run_procedure
 from hdsim.study.commands import bench, presets
 from hdsim.study.known_metrics import find_metric, metrics
 from hdsim.study.known_procedures import find_procedure, procedures
@@ -38,7 +38,7 @@ def test_the_default_drive_is_inside_the_catalogues_lines() -> None:
     found = {}
     for name in ("transmission_error", "torsion", "repeatability"):
         procedure = find_procedure(name)
-        runs = run_procedure(procedure, SEED, effects=default_effects(SEED), options=options.get(name))
+        runs = run_procedure(procedure, SEED, effects=CATALOGUE_EFFECTS, options=options.get(name))
         found |= {row.metric: row for row in figures_of(procedure, runs, lines) if row.line is not None}
     assert set(found) == {
         "transmission_accuracy",
@@ -58,7 +58,7 @@ def test_the_default_drive_is_inside_the_catalogues_lines() -> None:
     assert [(row.metric, row.value) for row in found.values() if not row.holds] == []
     # What docs/accuracy.md says: two of its lines are no lines of the catalogue's.
     procedure = find_procedure("torsion")
-    runs = run_procedure(procedure, SEED, effects=default_effects(SEED))
+    runs = run_procedure(procedure, SEED, effects=CATALOGUE_EFFECTS)
     found |= {row.metric: row for row in figures_of(procedure, runs, lines)}
     text = ACCURACY.read_text(encoding="utf-8")
     for title, metric in (
@@ -82,7 +82,7 @@ def test_the_hysteresis_of_every_size_is_inside_and_uses_its_line() -> None:
     procedure = find_procedure("torsion")
     for preset in ("csg-14-50", "csg-17-100", "csg-25-160"):
         drive = {"preset": preset, "mesh": {"model": "lumped"}}
-        runs = run_procedure(procedure, drive, effects=default_effects(drive), options={"period_s": 8.0})
+        runs = run_procedure(procedure, drive, effects=CATALOGUE_EFFECTS, options={"period_s": 8.0})
         rows = {
             row.metric: row for row in figures_of(procedure, runs, catalogue_lines(catalogue_figures(preset)))
         }
@@ -95,13 +95,13 @@ def test_the_hysteresis_of_every_size_is_inside_and_uses_its_line() -> None:
 def test_the_seed_drives_default_hysteresis_is_the_effects_own() -> None:
     from hdsim.effects.torsional_hysteresis_maxwell import TorsionalHysteresisMaxwell
 
-    found = default_effects(SEED)["torsional_hysteresis_maxwell"]["slip_torque_nm"]
-    assert found == pytest.approx(TorsionalHysteresisMaxwell().slip_torque_nm)
+    found = find_procedure("torsion").build(SEED, effects=CATALOGUE_EFFECTS).effects.active()
+    assert found["torsional_hysteresis_maxwell"] == TorsionalHysteresisMaxwell()
 
 
 def test_with_the_roughness_as_printed_the_drive_loses_ten_arcsec_more() -> None:
     drive = {"preset": "seed-2021-printed-roughness"}
-    scenario = find_procedure("torsion").build(drive, effects=default_effects(drive))
+    scenario = find_procedure("torsion").build(drive, effects=CATALOGUE_EFFECTS)
     recording = simulate(scenario)
     text = " ".join(ACCURACY.read_text(encoding="utf-8").split("**With G as printed**")[1].split())
     play, at_3, at_4, wind_up = (
@@ -292,7 +292,7 @@ def test_every_procedure_draws_a_labelled_picture() -> None:
         assert set(procedure.metrics) <= set(metrics())
         variants = [dict(variant) for variant in procedure.variants]
         scenarios = [
-            procedure.build(LUMPED, effects=default_effects(SEED), **(short[name] | v)) for v in variants
+            procedure.build(LUMPED, effects=CATALOGUE_EFFECTS, **(short[name] | v)) for v in variants
         ]
         runs = [BenchRun(v, s, simulate(s)) for v, s in zip(variants, scenarios, strict=True)]
         figure = procedure.plot(runs)

@@ -52,7 +52,7 @@ class Plan:
     def definition(self) -> dict[str, Any]:
         """Everything that decides the results, as plain data."""
         study = self.study.model_dump(mode="json", exclude={"name", "description", "confidence", "base"})
-        return {"study": study, "recipe": [self.recipe.base, self.recipe.drive]}
+        return {"study": study, "recipe": [self.recipe.base, self.recipe.written]}
 
 
 def load_study(path: str | Path) -> Plan:
@@ -143,8 +143,8 @@ def base_recipe(base: Base, names: tuple[str, ...], source: Source) -> tuple[Sce
         part = _part(source, ("base", "scenario"), base.scenario)
         built = build(part, Scenario)
         given: dict[str, Any] = {"scenario": built.model_dump(mode="json")}
-        drive = base.scenario.get("drive", {})
-        return built, Recipe(json.dumps(given), json.dumps(drive), names)
+        written = {name: base.scenario.get(name) or {} for name in ("drive", "effects")}
+        return built, Recipe(json.dumps(given), json.dumps(written), names)
     problems: list[Problem] = []
     with _collected(problems, source, ("base", "procedure")):
         find_procedure(base.procedure or "")
@@ -209,7 +209,7 @@ def _check_values(
             if any(type(value) is type(other) and value == other for other in tried):
                 continue
             tried.append(value)
-            single = Recipe(recipe.base, recipe.drive, (name,))
+            single = Recipe(recipe.base, recipe.written, (name,))
             mistake = _mistake(single, name, value)
             if mistake:
                 problems.append(Problem(source.mark(("parameters", name)), f"parameters: {name}", mistake))

@@ -32,12 +32,12 @@ class Recipe:
 
     Args:
         base: the study's base as JSON: ``scenario`` (complete), or ``procedure`` with its arguments.
-        drive: the base's drive as the user wrote it, as JSON, for another preset.
+        written: the base's drive and effects as the user wrote them, as JSON, for another preset.
         names: the study's parameters, in the order of every run's values.
     """
 
     base: str
-    drive: str
+    written: str
     names: tuple[str, ...]
 
     def data(self, values: Sequence[Any]) -> dict[str, Any]:
@@ -48,7 +48,7 @@ class Recipe:
         """
         given = dict(zip(self.names, values, strict=True))
         remade = {name: v for name, v in given.items() if remakes_base(name)}
-        data: dict[str, Any] = copy.deepcopy(_base(self.base, self.drive, json.dumps(remade, sort_keys=True)))
+        data: dict[str, Any] = copy.deepcopy(_base(self.base, self.written, json.dumps(remade, sort_keys=True)))
         # A choice of type or law goes first: it drops what belongs to the other choice.
         for name in sorted(given, key=lambda n: n.rsplit(".", 1)[-1] not in ("type", "law", "model", "kind")):
             if name not in remade:
@@ -83,7 +83,7 @@ def remakes_base(name: str) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _base(base: str, drive: str, remade: str) -> dict[str, Any]:
+def _base(base: str, written: str, remade: str) -> dict[str, Any]:
     """The base scenario as plain data, remade with another preset or other options."""
     given: dict[str, Any] = json.loads(base)
     changes: dict[str, Any] = json.loads(remade)
@@ -95,7 +95,9 @@ def _base(base: str, drive: str, remade: str) -> dict[str, Any]:
                 f"found the parameter {OPTIONS}{next(iter(options))}, but a scenario has no options"
             )
         if PRESET in changes:
-            data["drive"] = json.loads(drive) | {"preset": changes[PRESET]}
+            before = json.loads(written)
+            data["drive"] = before["drive"] | {"preset": changes[PRESET]}
+            data["effects"] = before["effects"]
         return data
     from hdsim.study.known_procedures import find_procedure
 
