@@ -11,6 +11,7 @@ from hdsim.drive.parameters import Drive
 from hdsim.drive.presets import catalogue_figures
 from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
+from hdsim.scenario.settings import Evaluation
 from hdsim.simulation.simulate import simulate
 from hdsim.study.bench import frequency, friction, positioning, settling, torsion, transmission
 from hdsim.study.bench.report import CATALOGUE_EFFECTS, catalogue_lines, figures_of, run_procedure
@@ -26,6 +27,9 @@ ARCSEC = 180 * 3600 / math.pi
 SEED = {"preset": "seed-2021"}
 LUMPED = {"preset": "seed-2021", "mesh": {"model": "lumped"}}
 FRICTIONLESS = LUMPED | {"friction": {"coulomb_nm": 0, "viscous_nm_s_per_rad": 0, "load_coefficient": 0}}
+
+#: A scenario with the default settling band of 30 arcsec.
+BAND_30 = settling.build(LUMPED)
 
 
 def measured(name, scenario):
@@ -252,14 +256,36 @@ def moved(error, *, rest=1.0):
 def test_settling_and_overshoot_of_a_known_decay() -> None:
     amplitude, decay = 600 / ARCSEC, 0.05
     recording = moved(lambda t: amplitude * np.exp(-t / decay))
-    assert find_metric("settling_time")(recording, None) == pytest.approx(
+    assert find_metric("settling_time")(recording, BAND_30) == pytest.approx(
         decay * math.log(600 / 30), abs=1e-3
+    )
+    wider = BAND_30.model_copy(update={"evaluation": Evaluation(settling_band_arcsec=100.0)})
+    assert find_metric("settling_time")(recording, wider) == pytest.approx(
+        decay * math.log(600 / 100), abs=1e-3
     )
     assert find_metric("overshoot")(recording, None) == pytest.approx(600, rel=1e-3)
     assert find_metric("positioning_error")(recording, None) == pytest.approx(0.0, abs=0.01)
     lagging = moved(lambda t: 100 / ARCSEC - amplitude * np.exp(-t / decay))
     assert find_metric("overshoot")(lagging, None) == pytest.approx(0.0, abs=0.1)
     assert find_metric("positioning_error")(lagging, None) == pytest.approx(100, rel=1e-3)
+    # It comes to rest, 100 arcsec from its target: the band about that it never enters for good.
+    assert find_metric("stabilization_time")(lagging, BAND_30) == pytest.approx(
+        decay * math.log(600 / 30), abs=1e-3
+    )
+    assert find_metric("settling_time")(lagging, BAND_30) == math.inf
+
+
+def test_a_swing_at_rest_hides_in_the_mean_and_is_told() -> None:
+    amplitude, frequency = 13.5 / ARCSEC, 7.0
+    swinging = moved(lambda t: 6.5 / ARCSEC + amplitude * np.sin(2 * np.pi * frequency * t), rest=4.0)
+    assert find_metric("positioning_error")(swinging, None) < 12
+    assert find_metric("positioning_error_peak")(swinging, None) == pytest.approx(20, rel=1e-3)
+    assert find_metric("limit_cycle_amplitude")(swinging, None) == pytest.approx(13.5, rel=1e-3)
+    assert find_metric("limit_cycle_frequency")(swinging, None) == pytest.approx(7.0, rel=2e-3)
+    dying = moved(lambda t: amplitude * np.exp(-0.03 * 44 * t) * np.sin(44 * t), rest=4.0)
+    assert find_metric("limit_cycle_amplitude")(dying, None) == 0.0
+    with pytest.raises(InputError, match="comes to rest"):
+        find_metric("limit_cycle_frequency")(dying, None)
 
 
 def test_tracking_error_of_a_known_offset() -> None:
