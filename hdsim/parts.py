@@ -211,6 +211,7 @@ class Effect(Part):
             a source's number is often another machine's.
         several: whether its fittings are errors of different things, one beside the other.
         adds_to: its fields that come on top of a number of the drive, by that number's path in the drive.
+        printed: whether catalogues print how large it is, so that ``effects: {set: catalogue}`` turns it on.
     """
 
     title: ClassVar[str]
@@ -219,6 +220,7 @@ class Effect(Part):
     number: ClassVar[Number] = Number(0.7, far=15.0, may_vanish=True)
     several: ClassVar[bool] = False
     adds_to: ClassVar[tuple[tuple[str, str], ...]] = ()
+    printed: ClassVar[bool] = False
 
     @classmethod
     def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:

@@ -91,6 +91,7 @@ class KinematicError(Effect):
         },
     )
     several: ClassVar[bool] = True
+    printed: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (

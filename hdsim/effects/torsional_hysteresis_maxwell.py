@@ -91,6 +91,7 @@ class TorsionalHysteresisMaxwell(Effect):
             "lugre_friction": "absent with the wave generator locked",
         },
     )
+    printed: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Amplitude({"slip_torque_nm": 1.0}),),

@@ -51,7 +51,7 @@ def _speed(scenario: Scenario) -> list[str]:
     if ratio * output <= limit * (1.0 + 1e-9):
         return []
     return [
-        f"{field}: found up to {output:.4g} rpm at the output, so {ratio * output:.4g} rpm at the wave "
+        f"{field}: found up to {output:,.0f} rpm at the output, so {ratio * output:,.0f} rpm at the wave "
         f"generator; {gear.name} may turn with {limit:g} rpm"
     ]
 

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from pydantic import (
     BaseModel,
     Field,
+    SerializerFunctionWrapHandler,
     ValidationInfo,
     create_model,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -36,6 +38,11 @@ class EffectChoice(Parameters):
     """``catalogue``: kinematic error and torsional hysteresis as large as the preset's catalogue says; an effect
     that is named beside it has its own numbers, and null turns it off."""
 
+    @model_serializer(mode="wrap")
+    def _on_alone(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Effects that are on: null is written where it turns one of a set off, and the set is resolved."""
+        return {name: data for name, data in dump(self).items() if data is not None}
+
     def active(self) -> dict[str, Effect]:
         """The effects that are on, by name."""
         found = {name: getattr(self, name) for name in type(self).model_fields}
@@ -56,10 +63,6 @@ if TYPE_CHECKING:
 else:
     Effects = _effects()
     Effects.__doc__ = EffectChoice.__doc__
-
-
-#: What ``effects: {set: catalogue}`` turns on.
-CATALOGUE_SET = ("kinematic_error", "torsional_hysteresis_maxwell")
 
 
 def size_of(drive: Drive) -> DriveSize:
@@ -113,7 +116,7 @@ class Scenario(Parameters):
                     "with their numbers instead"
                 )
             del chosen["set"]
-            chosen = {name: {} for name in CATALOGUE_SET} | chosen
+            chosen = {name: {} for name, effect in catalogue().items() if effect.printed} | chosen
         size = size_of(drive)
         for name, effect in catalogue().items():
             stated = chosen.get(name)

@@ -75,7 +75,8 @@ def run(
             session.close()
     tell(done, loaded.run.duration_s)
     recording = hdsim.open_log(path)
-    tell_numbers(recording, loaded)
+    if len(recording.time) > 1:
+        tell_numbers(recording, loaded)
     click.echo(f"log      {path}")
     if verify:
         from hdsim.log import verify_log

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -60,7 +61,12 @@ class Row:
 
     @property
     def holds(self) -> bool | None:
-        """Whether the number is within its limit; None without one."""
+        """Whether the number is within its limit; a time that never comes and a swing at rest are in none.
+
+        None without a limit.
+        """
+        if self.name == "limit_cycle_amplitude" or (math.isinf(self.measured.value) and not self.least):
+            return False
         if self.limit is None:
             return None
         return self.measured.value >= self.limit if self.least else self.measured.value <= self.limit
@@ -124,7 +130,7 @@ def _beside(name: str, numbers: RunMetrics) -> str:
         return f"to ±{scenario.evaluation.settling_band_arcsec:g} arcsec of the target"
     if name == "tooth_force_max":
         return f"mean at rated torque {mean_tooth_force_n(scenario, scenario.drive.rated_torque_nm):.3g} N"
-    if name == "positioning_error_peak":
+    if name in ("positioning_error_peak", "limit_cycle_amplitude"):
         return "while the command rests"
     return ""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,9 +103,11 @@ def _quantile(values: Array, share: float) -> float:
     """Quantile, linear between two values and infinite beyond the last finite one; NaN of nothing."""
     if not len(values):
         return np.nan
-    with np.errstate(invalid="ignore"):
-        found = float(np.quantile(values, share))
-    return np.inf if np.isnan(found) else found
+    if np.isfinite(values).all():
+        return float(np.quantile(values, share))
+    place = share * (len(values) - 1)
+    low, high = np.sort(values)[[int(place), math.ceil(place)]]
+    return float(low if low == high else low + (place % 1.0) * (high - low))
 
 
 def paired_difference(values: Array, first: Array, confidence: float) -> tuple[Interval, int]:
