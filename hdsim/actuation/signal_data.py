@@ -124,7 +124,7 @@ def joined(moves: Sequence[Move], initial: float = 0.0) -> Move:
 _POINTS = 2001
 
 
-def _stacked(segment: Segment, used: Array, lengths: Array) -> Iterator[tuple[Any, Any]]:
+def _stacked(segment: Segment, used: Any, lengths: Array) -> Iterator[tuple[Any, Any]]:
     """Records and lengths of a segment's pieces: cubics all at once, shape (n, 1), others one by one."""
     import numpy as np
 
@@ -151,7 +151,9 @@ def _evaluated(kind: int, row: Any, t: Array) -> Array:
         waves = np.array(row[2:]).reshape(-1, 3)
         sines = waves[:, 0, None] * np.exp(1j * (waves[:, 1, None] * t + waves[:, 2, None]))
         rates = 1j * waves[:, 1, None]
-        return np.array([offset + sines.sum(0).imag, (rates * sines).sum(0).imag, (rates**2 * sines).sum(0).imag])
+        return np.array(
+            [offset + sines.sum(0).imag, (rates * sines).sum(0).imag, (rates**2 * sines).sum(0).imag]
+        )
     if kind == law.TRIANGLE:
         return np.array([offset + amplitude + 0 * t, 4 * row[2] * amplitude + 0 * t, 0 * t])
     rate = row[3]

@@ -1,9 +1,9 @@
 """Default numbers of effects for a drive of any size and ratio.
 
 The defaults in the effects' files are those of one gear, size 20 at ratio 100. What a number is a multiple of
-(``Plausible.of``: rated torque T_N, T_N/i, K1, ...) carries it over to another: similar drives have friction and
-hysteresis in proportion to what they transmit. Where a catalogue prints the quantity itself (accuracy, hysteresis
-loss), the effect's ``sized`` takes that.
+(``Plausible.of``: rated torque T_N, T_N/i, K1, ...) carries it over to another: similar drives have friction
+and hysteresis in proportion to what they transmit. Where a catalogue prints the quantity itself (accuracy,
+hysteresis loss), the effect's ``sized`` takes that.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ def sized_defaults(effect: type[Effect], given: Mapping[str, Any], size: DriveSi
         scales_of(one.rated_torque_nm, one.ratio, one.stiffness_k1_nm_per_rad) for one in (size, SIZE_20_100)
     )
     factors = {scale: own[scale] / reference[scale] for scale in own}
-    default = {name: field.get_default(call_default_factory=True) for name, field in effect.model_fields.items()}
+    default = {
+        name: field.get_default(call_default_factory=True) for name, field in effect.model_fields.items()
+    }
     found = _times(effect, default, factors) | effect.sized(given, size, SIZE_20_100)
     return {name: value for name, value in found.items() if name not in given}
 

@@ -1,4 +1,4 @@
-"""What a scenario asks of its drive, by rigid bodies alone: torques, speeds and inertias no gear of its size has.
+"""What a scenario asks of its drive, by rigid bodies alone: torques, speeds and inertias beyond its size.
 
 Before a run: what the run itself shows beyond a rating is an event of it (``hdsim.simulation.limits``).
 """

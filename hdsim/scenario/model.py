@@ -35,8 +35,8 @@ class EffectChoice(Parameters):
     """Physical effects by name; one that is not named is off."""
 
     set: Literal["catalogue"] | None = None
-    """``catalogue``: kinematic error and torsional hysteresis as large as the preset's catalogue says; an effect
-    that is named beside it has its own numbers, and null turns it off."""
+    """``catalogue``: kinematic error and torsional hysteresis as large as the preset's catalogue says; an
+    effect that is named beside it has its own numbers, and null turns it off."""
 
     @model_serializer(mode="wrap")
     def _on_alone(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -112,8 +112,8 @@ class Scenario(Parameters):
         if chosen.get("set") == "catalogue":
             if drive.preset not in preset_names():
                 raise ValueError(
-                    "set: catalogue needs a drive with a preset, whose catalogue it follows; name the effects "
-                    "with their numbers instead"
+                    "set: catalogue needs a drive with a preset, whose catalogue it follows; name the "
+                    "effects with their numbers instead"
                 )
             del chosen["set"]
             chosen = {name: {} for name, effect in catalogue().items() if effect.printed} | chosen

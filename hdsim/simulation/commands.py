@@ -122,7 +122,7 @@ def tell_numbers(recording: Recording, scenario: Scenario) -> None:
     table.add_column("value", justify="right")
     table.add_column("unit")
     table.add_column("limit", justify="right")
-    table.add_column("by")
+    table.add_column("held against")
     table.add_column("share", justify="right")
     last = ""
     for row in engineering_rows(recording.metrics(scenario)):
@@ -137,7 +137,7 @@ def tell_numbers(recording: Recording, scenario: Scenario) -> None:
             row.name.replace("_", " "),
             "never" if math.isinf(value) else f"{value:.4g}",
             unit,
-            "" if row.limit is None else f"{'>=' if row.least else '<='} {row.limit:.4g}",
+            "" if row.limit is None else f"{'≥' if row.least else '≤'} {row.limit:.5g}",
             row.of,
             share,
             style="bold red" if bad else None,

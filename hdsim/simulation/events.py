@@ -205,7 +205,7 @@ class EventDetector:
             return []
         if times[0] == times[1]:
             times, angles, moves = times[1:], angles[1:], moves[1:]
-        found = []
+        found: list[Event] = []
         if "tracking_error" in state:
             told = slice(len(time) - len(moves), None)
             found += self._rests.feed(time[told], state["tracking_error"][told], ~moves)

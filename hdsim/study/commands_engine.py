@@ -110,25 +110,21 @@ def _tell_summary(summaries: list[Any], confidence: float) -> None:
     paired = any(s.pairs for s in summaries)
     several = any(s.runs > 1 for s in summaries)
     shown = Table("metric", "at")
-    columns = ["runs", "mean"]
-    columns += [f"{confidence:.0%} interval"] if several else []
-    columns += ["less the first"] if paired else ["median", "5 % .. 95 %"] if several else []
-    columns += [f"{confidence:.0%} interval, paired"] if paired and several else []
-    for column in columns:
+    sure = f" ± {confidence:.0%}" if several else ""
+    for column in ("runs", f"mean{sure}", *((f"less the first{sure}",) if paired else ())):
+        shown.add_column(column, justify="right")
+    for column in ("median", "5 % .. 95 %") if several and not paired else ():
         shown.add_column(column, justify="right")
     shown.add_column("unit")
     for s in summaries[:40]:
         runs = str(s.runs) + (f", {s.never} never" if s.never else "")
-        row = [s.metric, words(s.point), runs, "never" if s.mean.value == math.inf else f"{s.mean.value:.5g}"]
-        row += [_ends(s.mean)] if several else []
+        row = [s.metric.replace("_", " "), words(s.point), runs, _with_interval(s.mean, ".5g")]
         if paired:
-            row += [f"{s.difference.value:+.4g}" if s.pairs else ""]
-            row += [_ends(s.difference, "+.4g")] if several else []
+            row.append(_with_interval(s.difference, "+.4g") if s.pairs else "")
         elif several:
             row += [f"{s.median:.5g}", f"{s.low:.5g} .. {s.high.value:.5g}"]
         shown.add_row(*row, s.unit)
-    terminal = console()
-    terminal.print(shown)
+    console().print(shown)
     if len(summaries) > 40:
         click.echo(f"... and {len(summaries) - 40} more in summary.csv")
     if paired:
@@ -137,10 +133,12 @@ def _tell_summary(summaries: list[Any], confidence: float) -> None:
         click.echo("one drive a row: intervals need replicates (2 or more)")
 
 
-def _ends(interval: Any, form: str = ".5g") -> str:
-    if math.isnan(interval.low):
-        return ""
-    return f"{interval.low:{form}} .. {interval.high:{form}}"
+def _with_interval(interval: Any, form: str) -> str:
+    """A mean with the half-width of its interval, which is symmetric (Student's t)."""
+    if math.isinf(interval.value):
+        return "never"
+    half = "" if math.isnan(interval.low) else f" ± {interval.high - interval.value:.2g}"
+    return f"{interval.value:{form}}{half}"
 
 
 @click.command()
@@ -160,8 +158,8 @@ def budget(
 ) -> None:
     """Split the positioning error of SCENARIO into its causes.
 
-    Every combination of causes is run (of many causes: those that random orders go through). A cause's share is
-    Shapley's: shares and rest sum to the whole, however the causes work together.
+    Every combination of causes is run (of many causes: those that random orders go through). A cause's share
+    is Shapley's: shares and rest sum to the whole, however the causes work together.
     """
     import hdsim
     from hdsim.study.engine.budget import error_budget
@@ -206,10 +204,8 @@ def _tell_budget(found: Any) -> None:
     table.add_row("whole", *(f"{found.whole:+.6g}", "") + (f"{found.whole:+.6g}",) * 2)
     console().print(table)
     how = f"{found.orders} random orders; ±: standard error" if found.orders else "all combinations"
-    click.echo(
-        f"share: Shapley, {how}, {found.runs} runs; shares and rest sum to the whole. switched off and alone: "
-        "one cause at a time; what they leave over is the interaction"
-    )
+    click.echo(f"share: Shapley, {how}, {found.runs} runs; shares and rest sum to the whole")
+    click.echo("switched off, alone: one cause at a time; what they leave over is the interaction")
 
 
 @click.command()
@@ -220,7 +216,9 @@ def _tell_budget(found: Any) -> None:
     "--parameter", required=True, help="Dotted name of the parameter, as in drive.mesh.pitch_error_m."
 )
 @click.option(
-    "--procedure", metavar="NAME", help="Put drive and effects of SCENARIO, or of a preset, on this bench test."
+    "--procedure",
+    metavar="NAME",
+    help="Put drive and effects of SCENARIO, or of a preset, on this bench test.",
 )
 @click.option(
     "--confidence", type=click.FloatRange(0.5, 1.0, max_open=True), default=0.95, show_default=True,
@@ -281,7 +279,8 @@ def tolerance(
         drives = len(probe.metric)
         if probe.given:
             click.echo(
-                f"  {probe.value:<12.5g} {probe.passing:>6.1%} of drives within, quantile {probe.quantile:.4g}"
+                f"  {probe.value:<12.5g} {probe.passing:>6.1%} of drives within, "
+                f"quantile {probe.quantile:.4g}"
             )
             for reason, count in probe.reasons[:3]:
                 click.echo(f"  {'':<12} {count} of {drives} failed: {reason[:160]}")

@@ -104,7 +104,8 @@ def _limits(scenario: Scenario) -> dict[str, list[tuple[float, str]]]:
     motor = getattr(scenario.command.motor, "torque_limit_nm", None)
     found = {
         "positioning_error": [(scenario.evaluation.settling_band_arcsec, "settling band")],
-        "output_torque_max": rating("repeated_peak_torque", "momentary_peak_torque") or [(rated, "rated torque")],
+        "output_torque_max": rating("repeated_peak_torque", "momentary_peak_torque")
+        or [(rated, "rated torque")],
         "output_torque_rms": [(rated, "rated torque")],
         "average_load_torque": rating("average_torque"),
         "motor_torque_max": [] if motor is None else [(motor, "motor's limit")],
@@ -149,4 +150,3 @@ def told_events(events: Sequence[Event], most: int = 8) -> list[Event]:
             first.setdefault(kind, event)
     ranked = sorted(first.values(), key=lambda event: (event.level != "error", event.time))
     return ranked[:most]
-

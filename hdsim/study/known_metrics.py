@@ -18,4 +18,3 @@ def find_metric(name: str) -> Metric:
         InputError: there is none; the message names the nearest.
     """
     return named("metric", name, metrics())
-

@@ -5,9 +5,13 @@ import pytest
 from engine_cases import SCENARIO
 
 from hdsim.scenario import Scenario
+from hdsim.simulation.simulate import simulate
 from hdsim.study.engine.budget import error_budget
 from hdsim.study.engine.budget_plot import plot_budget
 from hdsim.study.engine.causes import causes
+from hdsim.study.engine.definition import Base, Study, ValueList
+from hdsim.study.engine.reading import plan
+from hdsim.study.engine.study import run_study
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 ARCSEC = math.degrees(1) * 3600
@@ -86,6 +90,21 @@ def test_backlash_is_the_gap_when_a_load_closes_it():
     lever = geometry.pitch_radius_m * math.cos(math.radians(geometry.pressure_angle_deg))
     # The load of -20 N m pushes the output back by the half-gap over the lever.
     assert backlash.removed == pytest.approx(-ARCSEC * half_gap / lever, rel=0.02)
+
+
+def test_run_budget_and_study_have_one_error_to_the_last_bit(tmp_path):
+    data = LINEAR | {"run": {"duration_s": 0.6, "seed": 11}}
+    scenario = Scenario.model_validate(data)
+    own = simulate(scenario).metrics()["positioning_error"].value
+    assert abs(error_budget(scenario, shares=False).whole) == own
+    given = Study(
+        base=Base(scenario=data),
+        parameters={"load.inertia_kg_m2": ValueList(type="list", values=[0.3, 0.4])},
+        metrics=["positioning_error"],
+    )
+    table = run_study(plan(given), tmp_path).table
+    assert table.values("positioning_error")[0] == own
+    assert table.columns["seed"].values == [11, 11]
 
 
 def test_scenario_without_dwells_splits_its_transmission_error():

@@ -39,9 +39,7 @@ def test_intervals_agree_with_closed_forms():
 
 def test_differences_are_paired_over_the_same_drives(tmp_path):
     values = {"type": "list", "values": [2e-6, 4e-6, 6e-6]}
-    given = study(
-        TOOTHED, parameters={"drive.mesh.pitch_error_m": values}, replicates=5, confidence=0.9
-    )
+    given = study(TOOTHED, parameters={"drive.mesh.pitch_error_m": values}, replicates=5, confidence=0.9)
     result = run_study(plan(given), tmp_path)
     first, second, third = summarise(result.plan, result.table)
     measured = result.table.values(METRIC).reshape(3, 5)

@@ -21,9 +21,7 @@ def test_the_glove_game():
 def test_what_two_causes_make_together_is_halved_and_all_sums_to_the_whole(own, together, rest):
     names = "abcd"
     weight = dict(zip(names, own, strict=True))
-    value = {
-        s: rest + sum(weight[x] for x in s) + together * ({"a", "b"} <= s) for s in coalitions(names)
-    }
+    value = {s: rest + sum(weight[x] for x in s) + together * ({"a", "b"} <= s) for s in coalitions(names)}
     found = shapley_shares(names, value)
     half = together / 2
     expected = [own[0] + half, own[1] + half, own[2], own[3]]

@@ -1,4 +1,4 @@
-"""The numbers of a run: computed when asked for, the same from memory and from a log, told with their limits."""
+"""The numbers of a run: computed when asked for, alike from memory and from a log, told with limits."""
 
 import math
 

@@ -205,9 +205,7 @@ def _chosen(recording: Recording, metric: str | None) -> tuple[str, str, Dwell |
         return "transmission_error_peak_to_peak", "arcsec", None
 
 
-def _value(
-    recording: Recording, scenario: Scenario, error: str, dwell: Dwell | None, on: Coalition
-) -> float:
+def _value(recording: Recording, scenario: Scenario, error: str, dwell: Dwell | None, on: Coalition) -> float:
     """The error of a run.
 
     Raises:

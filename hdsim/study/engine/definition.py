@@ -236,9 +236,10 @@ class Study(Parameters):
     """Drives with other random tooth surfaces and noise at every point of the design; the first is the
     base's own (``run.seed``)."""
     surfaces: Literal["common", "population", "independent"] | None = None
-    """Which runs have the same drive. ``common``: replicate k is one drive, whatever else varies. ``population``:
-    every sample of the distributions is a drive of its own, the same at all stated values. ``independent``:
-    no two runs. Left out: common, but population where random samples stand for a series of drives."""
+    """Which runs have the same drive. ``common``: replicate k is one drive, whatever else varies.
+    ``population``: every sample of the distributions is a drive of its own, the same at all stated values.
+    ``independent``: no two runs. Left out: common, or population where distributions are
+    sampled at random."""
     seed: int = Field(0, ge=0, lt=2**63)
     """Seed of the samples and of the drives after the base's own."""
     metrics: list[str] = Field(min_length=1)

@@ -181,7 +181,10 @@ def heat_map(
     mean = np.full((len(y), len(x)), np.nan)
     never: set[tuple[int, int]] = set()
     for s in summaries:
-        at = (int(np.searchsorted(y, float(s.point[y_name]))), int(np.searchsorted(x, float(s.point[x_name]))))
+        at = (
+            int(np.searchsorted(y, float(s.point[y_name]))),
+            int(np.searchsorted(x, float(s.point[x_name]))),
+        )
         mean[at] = s.mean.value if np.isfinite(s.mean.value) else np.nan
         if s.never:
             never.add(at)

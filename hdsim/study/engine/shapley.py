@@ -1,12 +1,12 @@
 """Shapley's shares: a whole that several causes make together, shared out so that nothing is left over.
 
-The share of cause i is what it adds when the causes are switched on one after the other, mean over all orders,
+The share of cause i is what it adds when the causes are switched on one after the other, mean of all orders,
 
     phi_i = sum over S without i of |S|! (n - |S| - 1)! / n! * (v(S with i) - v(S)),
 
 with v(S) the value when the causes S are on. The shares sum to v(all) - v(none) whatever the interactions;
-a cause that changes nothing has none, and two that act alike have the same (Shapley 1953, A value for n-person
-games; for errors of models: Owen 2014, SIAM/ASA J. Uncertainty Quantification 2:245).
+a cause that changes nothing has none, and two that act alike have the same (Shapley 1953, A value for
+n-person games; for errors of models: Owen 2014, SIAM/ASA J. Uncertainty Quantification 2:245).
 """
 
 from __future__ import annotations

@@ -178,14 +178,19 @@ def write_summary(summaries: list[MetricSummary], path: Path, confidence: float)
         upper = [f"q95_low_{percent}", f"q95_high_{percent}"]
         spread = ["standard_deviation", "median", "q05", "q95", *upper, "least", "largest"]
         paired = ["difference", f"difference_low_{percent}", f"difference_high_{percent}", "pairs"]
-        writer.writerow(["metric", "unit", *names, "runs", "failed", "never", "mean", *interval, *spread, *paired])
+        writer.writerow(
+            ["metric", "unit", *names, "runs", "failed", "never", "mean", *interval, *spread, *paired]
+        )
         for s in summaries:
             numbers = [s.mean.value, s.mean.low, s.mean.high, s.standard_deviation, s.median, s.low]
             numbers += [s.high.value, s.high.low, s.high.high, s.least, s.largest]
             numbers += [s.difference.value, s.difference.low, s.difference.high]
             point = [v if isinstance(v, str | int | float) else json.dumps(v) for v in s.point.values()]
             writer.writerow(
-                [s.metric, s.unit, *point, s.runs, s.failed, s.never]
-                + [*("" if np.isnan(x) else x for x in numbers), s.pairs]
+                [
+                    *(s.metric, s.unit, *point, s.runs, s.failed, s.never),
+                    *("" if np.isnan(x) else x for x in numbers),
+                    s.pairs,
+                ]
             )
     return path

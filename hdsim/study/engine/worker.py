@@ -48,7 +48,9 @@ class Recipe:
         """
         given = dict(zip(self.names, values, strict=True))
         remade = {name: v for name, v in given.items() if remakes_base(name)}
-        data: dict[str, Any] = copy.deepcopy(_base(self.base, self.written, json.dumps(remade, sort_keys=True)))
+        data: dict[str, Any] = copy.deepcopy(
+            _base(self.base, self.written, json.dumps(remade, sort_keys=True))
+        )
         # A choice of type or law goes first: it drops what belongs to the other choice.
         for name in sorted(given, key=lambda n: n.rsplit(".", 1)[-1] not in ("type", "law", "model", "kind")):
             if name not in remade:

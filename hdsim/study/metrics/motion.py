@@ -183,7 +183,9 @@ def motor_torque_max(recording: Recording, scenario: Scenario) -> float:
     return float(np.max(np.abs(recording["motor_torque"])))
 
 
-@metric("output_torque_max", "N m", "largest absolute torque of the drive on the output", "held against the peaks")
+@metric(
+    "output_torque_max", "N m", "largest absolute torque of the drive on the output", "held against the peaks"
+)
 def output_torque_max(recording: Recording, scenario: Scenario) -> float:
     """Largest absolute torque that the drive transmits, N m."""
     return float(np.max(np.abs(recording["output_torque"])))

@@ -102,7 +102,9 @@ def contact_wind_up(recording: Recording, scenario: Scenario) -> float:
     return ARCSEC * float(contact_law(scenario).penetration(force)) / lever_m(scenario)
 
 
-@metric("tooth_force_max", "N", "largest normal force of any tooth, at run.teeth_rate_hz", f"{_PAPER}, Eq. 13, 14")
+@metric(
+    "tooth_force_max", "N", "largest normal force of any tooth, at run.teeth_rate_hz", f"{_PAPER}, Eq. 13, 14"
+)
 def tooth_force_max(recording: Recording, scenario: Scenario) -> float:
     """Largest normal force of a tooth in the teeth table, N.
 
@@ -111,5 +113,7 @@ def tooth_force_max(recording: Recording, scenario: Scenario) -> float:
     """
     _mesh(scenario)
     if "teeth" not in recording.tables:
-        raise InputError("the load of the teeth needs their forces; this run keeps none (run.teeth_rate_hz: 0)")
+        raise InputError(
+            "the load of the teeth needs their forces; this run keeps none (run.teeth_rate_hz: 0)"
+        )
     return float(np.max(np.abs(recording.tables["teeth"]["normal_force"])))
