@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hdsim.errors import InputError
+from hdsim.errors import HdsimError, InputError
 from hdsim.study.known_metrics import find_metric, metrics
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class RunMetrics(Mapping[str, Measured]):
             metric = find_metric(name)
             try:
                 value = float(metric(self.recording, self.scenario))
-            except InputError as error:
+            except HdsimError as error:
                 self._known[name] = str(error)
             else:
                 about = (metric.unit, metric.description, metric.source)

@@ -1,6 +1,7 @@
 """The numbers of a run: computed when asked for, alike from memory and from a log, told with limits."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,7 @@ from hdsim.recording import Event, Recording
 from hdsim.scenario import Scenario
 from hdsim.study.engineering import engineering_rows, told_events
 
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 DATA = {
     "drive": {"preset": "csg-17-80", "mesh": {"model": "lumped"}},
     "command": {
@@ -86,6 +88,16 @@ def test_rows_are_held_against_the_tightest_limit_that_they_keep(run):
     assert rows["settling_time"].holds is False
     assert str(rows["settling_time"].measured) == "never"
     assert rows["positioning_error"].measured.value > rows["positioning_error"].limit == 30.0
+
+
+@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_run_that_is_cut_short_has_numbers_or_says_why_not(path):
+    data = hdsim.load_scenario(path).model_dump(mode="json")
+    data["drive"]["mesh"] = {"model": "lumped"}
+    data["run"] |= {"duration_s": 0.02, "sample_rate_hz": 200.0}
+    numbers = hdsim.simulate(Scenario.model_validate(data)).metrics()
+    assert all(not math.isnan(number.value) for number in numbers.values())
+    assert {row.name for row in engineering_rows(numbers)} <= set(numbers)
 
 
 def test_one_warning_of_a_kind_is_told_and_errors_first():

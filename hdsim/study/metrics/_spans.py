@@ -135,6 +135,8 @@ class Plateau:
 def plateaus(recording: Recording, settle: float = 0.4, shortest_s: float = 0.05) -> list[Plateau]:
     """Stretches of constant speed and load, in order; the first share ``settle`` of each is left out."""
     time, speed, load = recording.time, recording["motor_velocity"], recording["load_torque"]
+    if len(time) < 2:
+        return []
     fast = np.max(np.abs(speed), initial=0.0)
     strong = np.max(np.abs(load), initial=0.0)
     step = np.gradient(time)
