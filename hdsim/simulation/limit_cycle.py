@@ -22,8 +22,8 @@ ARCSEC = 180.0 * 3600.0 / math.pi
 #: Least amplitude that counts, rad: 1 arcsec, below what an output encoder of 20 bits resolves.
 LEAST = 1.0 / ARCSEC
 #: Periods that have to be seen: fewer may be ringing that dies.
-PERIODS = 4
-#: Least swing of the later half over that of the earlier one: damping of 1 % of the critical takes more away.
+PERIODS = 3
+#: Least swing of the later half over that of the earlier one: damping above 1 % of the critical takes more away.
 KEPT = 0.9
 #: Largest standard deviation of the periods, as a share of their mean.
 REGULAR = 0.25
@@ -56,7 +56,7 @@ def limit_cycle(time: Array, error: Array) -> LimitCycle | None:
         error: output less commanded angle, rad, shape (n,).
 
     Returns:
-        What swings there for four periods at least, evenly, without getting smaller; None if nothing does.
+        What swings there for three periods at least, evenly, without getting smaller; None if nothing does.
     """
     late = time >= max(0.5 * (time[0] + time[-1]), time[-1] - LONGEST_S)
     t, x = time[late], error[late]

@@ -135,6 +135,8 @@ def _tell_summary(summaries: list[Any], confidence: float) -> None:
 
 def _with_interval(interval: Any, form: str) -> str:
     """A mean with the half-width of its interval, which is symmetric (Student's t)."""
+    if math.isnan(interval.value):
+        return "none"
     if math.isinf(interval.value):
         return "never"
     half = "" if math.isnan(interval.low) else f" ± {interval.high - interval.value:.2g}"

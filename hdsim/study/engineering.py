@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -37,6 +38,9 @@ SECTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
         ),
     ),
 )  # fmt: skip
+
+#: Events that only count those before them (``hdsim.simulation.quota``).
+_COUNTED = re.compile(r"\d+ more times? until ")
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,7 @@ def told_events(events: Sequence[Event], most: int = 8) -> list[Event]:
     """
     first: dict[str, Event] = {}
     for event in events:
-        if event.level in ("warning", "error"):
+        if event.level in ("warning", "error") and not _COUNTED.match(event.message):
             kind = " ".join(word for word in event.message.split() if not any(c.isdigit() for c in word))
             first.setdefault(kind, event)
     ranked = sorted(first.values(), key=lambda event: (event.level != "error", event.time))

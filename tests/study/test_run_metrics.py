@@ -106,5 +106,6 @@ def test_one_warning_of_a_kind_is_told_and_errors_first():
         Event(0.2, "warning", "drive", "rated torque of 29 N m exceeded"),
         Event(0.3, "warning", "drive", "rated torque of 29 N m exceeded"),
         Event(0.4, "error", "drive", "momentary peak torque of 113 N m exceeded"),
+        Event(0.5, "warning", "drive", "7 more times until 0.45 s: rated torque of 29 N m exceeded"),
     ]
     assert told_events(events) == [events[3], events[1]]

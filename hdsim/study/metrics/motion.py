@@ -30,7 +30,9 @@ _SETTLING = (
 _POSE = "ISO 9283:1998, 7.4 (pose stabilization time), the band about the attained angle"
 _OVERSHOOT = "ISO 9283:1998, 7.5 (pose overshoot): largest distance beyond the attained angle"
 _TRACKING = "output angle less commanded angle"
-_CYCLE = "Nordin and Gutman 2002, Automatica 38:1633; four even periods that do not die, later half of a rest"
+_CYCLE = (
+    "Nordin and Gutman 2002, Automatica 38:1633; three even periods that do not die, later half of a rest"
+)
 
 
 def settling(recording: Recording, dwell: Dwell, band: float, about: float | None = None) -> float:
