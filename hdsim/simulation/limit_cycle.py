@@ -23,7 +23,8 @@ ARCSEC = 180.0 * 3600.0 / math.pi
 LEAST = 1.0 / ARCSEC
 #: Periods that have to be seen: fewer may be ringing that dies.
 PERIODS = 3
-#: Least swing of the later half over that of the earlier one: damping above 1 % of the critical takes more away.
+#: Least swing of the later half over that of the earlier one: ringing dies faster, from 1 % of the critical
+#: damping on.
 KEPT = 0.9
 #: Largest standard deviation of the periods, as a share of their mean.
 REGULAR = 0.25

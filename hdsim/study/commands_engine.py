@@ -188,6 +188,11 @@ def _tell_budget(found: Any) -> None:
     signed = found.error == POSITIONING and found.whole < 0
     where = " (the output stays behind its command: negative)" if signed else ""
     click.echo(f"{found.scenario}: {found.error.replace('_', ' ')} {abs(found.whole):.6g} {unit}{where}")
+    if found.swing_arcsec:
+        click.echo(
+            f"warning: the output swings by {found.swing_arcsec:.3g} arcsec at rest; its mean is split",
+            err=True,
+        )
     table = Table("cause")
     for name in (f"share, {unit}", "of the whole", f"switched off, {unit}", f"alone, {unit}"):
         table.add_column(name, justify="right")

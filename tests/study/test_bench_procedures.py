@@ -96,6 +96,16 @@ def test_the_hysteresis_of_every_size_is_inside_and_uses_its_line() -> None:
         )
 
 
+@pytest.mark.slow
+def test_a_small_drive_of_ratio_50_has_its_own_accuracy() -> None:
+    drive = {"preset": "csg-14-50"}
+    lines = catalogue_lines(catalogue_figures("csg-14-50"))
+    runs = run_procedure(find_procedure("transmission_error"), drive, effects=CATALOGUE_EFFECTS)
+    rows = {row.metric: row for row in figures_of(find_procedure("transmission_error"), runs, lines)}
+    # 1.2 arcmin are printed; size 20's numbers would give 45 arcsec.
+    assert 60 < rows["transmission_accuracy"].value < 72
+
+
 def test_the_seed_drives_default_hysteresis_is_the_effects_own() -> None:
     from hdsim.effects.torsional_hysteresis_maxwell import TorsionalHysteresisMaxwell
 

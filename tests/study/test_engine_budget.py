@@ -70,6 +70,7 @@ def test_parts_of_a_linear_drive_are_the_analytic_ones_and_add_up():
     total = sum(part.removed for part in found.parts)
     assert found.whole == pytest.approx(found.rest + total + found.interaction, abs=1e-9)
     assert abs(found.rest) < 0.01
+    assert found.swing_arcsec == 0.0
     # The sag needs both: Shapley gives each half of it, and nothing is left over.
     assert parts["wind_up"].share.value == pytest.approx(wind_up + sag / 2, rel=0.01)
     assert parts["friction_and_control"].share.value == pytest.approx(sag / 2, rel=0.05)

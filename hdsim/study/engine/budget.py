@@ -80,6 +80,7 @@ class Budget:
         parts: the causes, largest first.
         runs: number of runs that were made.
         orders: number of orders that were drawn for the shares; 0: all combinations were run.
+        swing_arcsec: amplitude of the limit cycle at rest whose mean a positioning error is; 0: none.
     """
 
     scenario: str
@@ -90,6 +91,7 @@ class Budget:
     parts: tuple[Part, ...]
     runs: int
     orders: int = 0
+    swing_arcsec: float = 0.0
 
     @property
     def interaction(self) -> float:
@@ -144,6 +146,8 @@ def error_budget(
         InputError: the scenario has no cause that can be switched, or the metric does not fit it.
         HdsimError: a run stopped early, or its error is no finite number.
     """
+    from hdsim.study.known_metrics import find_metric
+
     found = causes(scenario)
     if not found:
         raise InputError("the scenario has no cause of error that can be switched off")
@@ -181,7 +185,8 @@ def error_budget(
         for cause in found
     ]
     parts.sort(key=lambda part: -abs(part.removed if part.share is None else part.share.value))
-    return Budget(scenario.name, error, unit, whole, rest, tuple(parts), len(sets), len(drawn))
+    swing = 0.0 if dwell is None else find_metric("limit_cycle_amplitude")(whole_run, prepared)
+    return Budget(scenario.name, error, unit, whole, rest, tuple(parts), len(sets), len(drawn), swing)
 
 
 def _prepared(scenario: Scenario) -> dict[str, Any]:
