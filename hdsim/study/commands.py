@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -181,7 +182,7 @@ def _print(rows: list[Row], title: str) -> None:
         table.add_row(
             row.procedure if row.procedure != last else "",
             row.metric,
-            row.problem or f"{row.value:.4g}",
+            row.problem or ("never" if math.isinf(row.value) else f"{row.value:.4g}"),
             "" if row.line is None else str(row.line),
             row.unit,
             verdict,

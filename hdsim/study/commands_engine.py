@@ -284,15 +284,10 @@ def tolerance(
 
     def tell(probe: Probe) -> None:
         drives = len(probe.metric)
-        if probe.given:
-            click.echo(
-                f"  {probe.value:<12.5g} {probe.passing:>6.1%} of drives within, "
-                f"quantile {probe.quantile:.4g}"
-            )
-            for reason, count in probe.reasons[:3]:
-                click.echo(f"  {'':<12} {count} of {drives} failed: {reason[:160]}")
-        else:
-            click.echo(f"  {probe.value:<12.5g} none of {drives} drives gives {metric}")
+        within = f"{probe.passing:>6.1%} of drives within, quantile {probe.quantile:.4g}"
+        click.echo(f"  {probe.value:<12.5g} {within if probe.given else f'no drive gives {metric}'}")
+        for reason, count in probe.reasons[:3]:
+            click.echo(f"  {'':<12} {count} of {drives} failed: {reason[:160]}")
 
     with executor(workers, scheduler) as (pool, width):
         found = find_tolerance(

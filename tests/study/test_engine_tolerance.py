@@ -65,8 +65,8 @@ def test_a_metric_that_no_run_gives_is_said_with_the_test_that_does():
         find(metric="lost_motion", low=0.1, high=0.2)
 
 
-def test_a_bench_procedure_is_a_base_and_a_failed_drive_is_told():
-    # A lumped drive's lost motion is 2 T / K1, whatever its surfaces: 60 arcsec at K1 = 2 * 1.56 N m / 60''.
+def test_a_bench_procedure_is_a_base():
+    # A lumped drive's lost motion is 2 T / K1 with T = 3 % of 52 N m, whatever its surfaces.
     drive = {"preset": "csg-20-100", "mesh": {"model": "lumped"}}
     base = Base(procedure="torsion", drive=drive, options={"period_s": 1.0}, run={"rtol": 1e-4})
     found = find_tolerance(
@@ -74,8 +74,20 @@ def test_a_bench_procedure_is_a_base_and_a_failed_drive_is_told():
         low=8e3, high=16e3, replicates=2,
     )  # fmt: skip
     assert found.value == pytest.approx(2 * 0.03 * 52 / (60 / 206265), rel=0.02)
-    # Above T1 K2 is the stiffer one: with K1 below 0 the drive cannot be built.
     assert all(not probe.reasons for probe in found.probes)
+
+
+def test_drives_that_fail_are_counted_with_their_reason():
+    # Gaps of 20 um alone are softer than the catalogue's whole drive.
+    base = Base(procedure="torsion", drive={"preset": "csg-20-100"}, options={"period_s": 1.0})
+    found = find_tolerance(
+        base, metric="lost_motion", limit=1e6, parameter="drive.mesh.half_gap_m", low=1e-7, high=2e-5,
+        replicates=2, precision=10.0,
+    )  # fmt: skip
+    assert found.value == 1e-7
+    ((reason, count),) = found.probes[-1].reasons
+    assert (found.probes[-1].given, count) == (0, 2)
+    assert "soft" in reason or "stiff" in reason
 
 
 def test_range_and_names_are_checked():

@@ -20,7 +20,7 @@ from hdsim.scenario.reader import Source
 from hdsim.study.engine.definition import Base, Study, ValueList
 from hdsim.study.engine.design import drive_seed
 from hdsim.study.engine.execute import InProcess, batches, execute
-from hdsim.study.engine.worker import Job, Row
+from hdsim.study.engine.worker import Batch, Job, Row, run_batch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -169,6 +169,13 @@ def find_tolerance(
     seeds = [drive_seed(checked.scenario.run.seed, seed, k) for k in range(replicates)]
     executor = pool or InProcess()
     probes: list[Probe] = []
+
+    # A metric of another test is missing from every run: the first drive tells.
+    alone = [run_batch(Batch(checked.recipe, (metric,), (Job(0, seeds[0], (low,)),)))[0]]
+    if alone[0].reason.startswith(f"{metric}: "):
+        alone += run_batch(Batch(checked.recipe, (metric,), (Job(0, seeds[0], (high,)),)))
+        if not any(row.metrics for row in alone):
+            raise InputError(_nothing(checked.scenario.name, metric, [(alone[0].reason, 1)]))
 
     def probe(value: float) -> bool:
         jobs = [Job(k, s, (value,)) for k, s in enumerate(seeds)]
