@@ -86,7 +86,7 @@ def engineering_rows(numbers: RunMetrics) -> list[Row]:
     for section, names in SECTIONS:
         for name in names:
             measured = numbers.get(name)
-            if measured is None or (name == "limit_cycle_amplitude" and measured.value == 0.0):
+            if measured is None or (name.startswith("limit_cycle") and measured.value == 0.0):
                 continue
             limits = allowed.get(name, [])
             kept = [one for one in limits if measured.value <= one[0]]
