@@ -53,7 +53,7 @@ def schema(of: str, output: Path | None) -> None:
 
     described: type[BaseModel] = Scenario
     if of == "loadcycle":
-        from hdsim.study.selection import LoadCycle
+        from hdsim.studies.selection import LoadCycle
 
         described = LoadCycle
     text = json.dumps(json_schema(described), indent=1)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.evidence import PlaceEvidence
-    from hdsim.diagnose.orders import Line
+    from hdsim.diagnosis.evidence import PlaceEvidence
+    from hdsim.diagnosis.orders import Line
     from hdsim.estimate.records import Array
     from hdsim.tell.findings import Compared, Findings
 

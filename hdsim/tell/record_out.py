@@ -12,7 +12,7 @@ from hdsim.estimate.records import CHANNELS
 from hdsim.recording import Column, Event, Recording, Table
 
 if TYPE_CHECKING:
-    from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.diagnosis.workflow import Diagnosis
 
 
 LOG, LAYOUT = "compared.mcap", "diagnose.json"
