@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+    from hdsim.scenario import Scenario
+    from hdsim.studies import RunMetrics
+
 Array = NDArray[np.float64]
 
 
@@ -163,6 +166,22 @@ class Recording:
         from hdsim.notebook import to_xarray
 
         return to_xarray(self)
+
+    def metrics(self, scenario: Scenario | None = None) -> RunMetrics:
+        """The run's numbers by name, such as ``settling_time``: value, unit, definition and its source.
+
+        The same numbers as in ``hdsim run``, ``hdsim budget`` and ``hdsim study``; each is computed when it
+        is first asked for.
+
+        Args:
+            scenario: what was run; what the recording carries when None.
+
+        Raises:
+            InputError: the recording carries no scenario and none is given.
+        """
+        from hdsim.studies import metrics_of
+
+        return metrics_of(self, scenario)
 
     def plot(self, **options: Any) -> Figure:
         """Draw the one-page figure of the run."""

@@ -97,14 +97,28 @@ def check(name: str, data: Any, model: Any, *, lists: bool = False) -> None:
         )
         if not has and (child is None or isinstance(item, int)):
             raise InputError(f"found an unknown parameter, {_suggestion(name, data, model)}")
-        # What is not written has its default: only its shape is known.
-        here, shape = (here[item] if has else _DEFAULT), child
+        # What is not written is off, or has its default: then only its shape is known.
+        absent = None if child is not None and child.optional else _DEFAULT
+        here, shape = (here[item] if has else absent), child
     if isinstance(here, list) and not lists:
         raise InputError(f"found {name!r}, a list of {len(here)}; expected one entry of it, as in {name}[0]")
 
 
+def _off(data: Any, shape: Shape) -> list[str]:
+    """Sections of a scenario's sections, effects above all, that are off and need not be written."""
+    found = []
+    for key, value in data.items():
+        section = shape.child(key)
+        for model in section.models.values() if section is not None and isinstance(value, dict) else ():
+            for name in model.model_fields.keys() - value.keys():
+                inner = section.child(name) if section is not None else None
+                if inner is not None and inner.optional and inner.models:
+                    found.append(f"{key}.{name}")
+    return sorted(found)
+
+
 def _suggestion(name: str, data: Any, model: Any) -> str:
-    known = known_names(data, model)
+    known = [*known_names(data, model), *_off(data, shape_of(model))]
     last = name.rsplit(".", 1)[-1]
     near = (
         get_close_matches(name, known, 1, cutoff=0.75)

@@ -13,10 +13,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 MOST_LINES = 350
-#: ``Recording.save``, ``plot`` and what notebooks show: they look to the right, when called.
+#: ``Recording.save``, ``plot``, ``metrics`` and what notebooks show: they look to the right, when called.
 ALLOWED = {
     ("recording", "log"),
     ("recording", "plot"),
+    ("recording", "studies"),
     *((room, "notebook") for room in ("recording", "scenario", "studies", "estimate", "diagnosis")),
 }
 

@@ -72,7 +72,7 @@ def test_a_scenario_shows_what_it_commands() -> None:
     text = scenario.with_({"description": "<b>bold</b> & more"})._repr_html_()
     page = Page(text)
     assert "&lt;b&gt;bold&lt;/b&gt; &amp; more" in text
-    assert page.row("drive") == ["seed-2021, ratio -100, rated torque 52 N m, teeth mesh"]
+    assert page.row("drive")[0].startswith("seed-2021, ratio -100, rated torque 52 N m, teeth mesh")
     assert png_size(page.picture())[0] > 500
     assert len(text) < 120_000
 
