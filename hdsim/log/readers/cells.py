@@ -129,11 +129,13 @@ class Layout:
         names: names of the columns; "" where one has none.
         units: what stands in the row of units, by column.
         first: index of the first row of numbers among the rows looked at.
+        words: columns whose cells there are words.
     """
 
     names: tuple[str, ...]
     units: dict[int, str]
     first: int
+    words: tuple[int, ...]
 
     @property
     def headless(self) -> bool:
@@ -179,7 +181,8 @@ def layout(rows: Sequence[Sequence[Any]], comments: Sequence[Sequence[str]] = ()
     else:
         head = next((line for line in reversed(comments) if _fits(line, width)), ())
     names = [_text(cell) for cell in head][:width]
-    return Layout(tuple(names + [""] * (width - len(names))), units, first)
+    words = tuple(k for k in range(width) if any(each[k] == "t" for each in later))
+    return Layout(tuple(names + [""] * (width - len(names))), units, first, words)
 
 
 def _text(cell: Any) -> str:

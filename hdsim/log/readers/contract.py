@@ -35,15 +35,22 @@ class Table(ABC):
         names: names of its columns, in their order; "" where one has none.
         units: units that the file states beside a name, by the column's place.
         notes: what was found out about the file's form, for a reader to check.
+        words: places of columns that hold words instead of numbers, as far as is known.
     """
 
     def __init__(
-        self, path: Path, names: Sequence[str], units: dict[int, str] | None = None, notes: Sequence[str] = ()
+        self,
+        path: Path,
+        names: Sequence[str],
+        units: dict[int, str] | None = None,
+        notes: Sequence[str] = (),
+        words: Iterable[int] = (),
     ) -> None:
         self.path = path
         self.names = tuple(names)
         self.units = units or {}
         self.notes = tuple(notes)
+        self.words = frozenset(words)
 
     @abstractmethod
     def read(self, places: Sequence[int], rows: int | None = None, tell: Tell = silent) -> list[Numbers]:

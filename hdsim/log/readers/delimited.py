@@ -85,7 +85,7 @@ class _Delimited(Table):
             notes.append("no names: columns by their number")
         if found.units:
             notes.append("a row of units")
-        super().__init__(path, found.names, found.units, notes)
+        super().__init__(path, found.names, found.units, notes, found.words)
         self.encoding = encoding
         self.separator = separator
         self.decimal = decimal

@@ -43,6 +43,7 @@ def open_table(path: Path, mapping: Mapping | None = None) -> Table:
     names: list[str] = []
     units: dict[int, str] = {}
     sheets: list[_Sheet] = []
+    words: list[int] = []
     for sheet in book.worksheets:
         rows = list(islice(_rows(sheet), _LOOKED_AT))
         found = layout(rows)
@@ -52,18 +53,20 @@ def open_table(path: Path, mapping: Mapping | None = None) -> Table:
         decimal = (mapping.decimal if mapping else None) or decimal_mark(texts, False) or "."
         prefix = f"{sheet.title}!" if sheets else ""
         units |= {len(names) + k: unit for k, unit in found.units.items()}
+        words += [len(names) + k for k in found.words]
         names += [f"{prefix}{name or k + 1}" if name or prefix else "" for k, name in enumerate(found.names)]
         sheets.append(_Sheet(sheet.title, found.first, len(found.names), decimal))
     if not sheets:
         raise InputError(f"{path}: no sheet holds a table of numbers")
-    return _Excel(path, names, units, book, sheets)
+    return _Excel(path, names, units, words, book, sheets)
 
 
 class _Excel(Table):
     def __init__(
-        self, path: Path, names: Sequence[str], units: dict[int, str], book: Any, sheets: Sequence[_Sheet]
+        self, path: Path, names: Sequence[str], units: dict[int, str], words: list[int], book: Any, sheets: list[_Sheet]
     ) -> None:
-        super().__init__(path, names, units, [f"sheet {', '.join(sheet.title for sheet in sheets)}"])
+        notes = [f"sheet {', '.join(sheet.title for sheet in sheets)}"]
+        super().__init__(path, names, units, notes, words)
         self.book = book
         self.sheets = sheets
 
