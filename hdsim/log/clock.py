@@ -1,4 +1,4 @@
-"""A recording's time: seconds out of what was written, and samples spread over the ticks of a coarse clock."""
+"""A recording's time: seconds out of what was written; samples spread over the ticks of a coarse clock."""
 
 from __future__ import annotations
 

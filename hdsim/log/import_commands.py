@@ -18,7 +18,7 @@ from hdsim.console import reading
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="The log [default: logs/DATA.mcap].")
 def import_data(data: Path, mapping: Path | None, output: Path | None) -> None:
-    """Turn the measured recording DATA into a log: CSV, Excel, Parquet, MATLAB, HDF5, TDMS, MDF, MCAP, ROS bag."""
+    """Turn the recording DATA (CSV, Excel, Parquet, MATLAB, HDF5, TDMS, MDF, MCAP, ROS) into a log."""
     from hdsim.errors import InputError
     from hdsim.log.importing import import_recording, write_imported
 

@@ -272,11 +272,9 @@ class OutlierMask(Parameters):
 Mask = Annotated[IntervalMask | OutlierMask, Field(discriminator="type")]
 
 
-class Mapping(Parameters):
-    """How a foreign recording becomes one of ours."""
+class Form(Parameters):
+    """How a file is to be read."""
 
-    description: str = Field("", max_length=10_000)
-    """What was measured, on which hardware, and where the file comes from."""
     format: (
         Literal["csv", "parquet", "excel", "matlab", "hdf5", "tdms", "mdf", "mcap", "ros1", "ros2"] | None
     ) = None
@@ -289,6 +287,13 @@ class Mapping(Parameters):
     """Encoding of a CSV file, such as ``utf-8`` or ``cp1252``; found when left out."""
     skip_lines: int = Field(0, ge=0)
     """Lines at the beginning of a CSV file that are not looked at."""
+
+
+class Mapping(Form):
+    """How a foreign recording becomes one of ours."""
+
+    description: str = Field("", max_length=10_000)
+    """What was measured, on which hardware, and where the file comes from."""
     ratio: float | None = None
     """Signed ratio, motor angle over output angle; negative where they turn against each other."""
     time: TimeSource
@@ -318,6 +323,20 @@ class Mapping(Parameters):
             if unknown:
                 raise ValueError(f"a mask names {unknown[0]!r}; mapped are: {', '.join(given)}")
         return self
+
+    def summary(self) -> str:
+        """What it says, one line for time, ratio and each channel."""
+        clock = self.time
+        source = f"{clock.rate_hz:g} Hz" if clock.rate_hz else f"{clock.column or clock.topic or 'stamps'}"
+        lines = [f"time {source}{f' in {clock.unit}' if clock.unit else ''}"]
+        lines += [f"ratio {self.ratio:g}"] if self.ratio is not None else []
+        for name, channel in self.channels.given().items():
+            place = channel.column if channel.topic is None else f"{channel.topic} {channel.field}"
+            side = getattr(channel, "side", None)
+            lines.append(
+                f"{name} from {place} in {getattr(channel, 'unit', '')}{f', at the {side}' if side else ''}"
+            )
+        return "\n".join(f"  {line}" for line in lines)
 
 
 def side_of(channel: str) -> Side:

@@ -10,15 +10,26 @@ import click
 from hdsim.console import console, reading
 
 if TYPE_CHECKING:
-    from hdsim.log.guess.findings import Draft
+    from hdsim.log.guess.findings import Draft, Ground
 
 
 @click.command(short_help="Draft a mapping of a measured recording.")
 @click.argument("data", type=click.Path(path_type=Path), metavar="FILE")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("mapping.yaml"), show_default=True,
-              help="The mapping.")  # fmt: skip
-@click.option("--base", type=click.Path(path_type=Path), default=Path("base.yaml"), show_default=True,
-              help="A base scenario of that ratio.")  # fmt: skip
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("mapping.yaml"),
+    show_default=True,
+    help="The mapping.",
+)
+@click.option(
+    "--base",
+    type=click.Path(path_type=Path),
+    default=Path("base.yaml"),
+    show_default=True,
+    help="A base scenario of that ratio.",
+)
 @click.option("--axis", type=int, help="Number of the axis, of a file with several.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE",
               help="Say what the file does not: ratio=100, time.unit=ms, COLUMN.channel=motor_angle, "
@@ -26,18 +37,24 @@ if TYPE_CHECKING:
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal mark, where the file leaves it open.")
 @click.option("--force", is_flag=True, help="Write over files that are there.")
 def mapping(
-    data: Path, output: Path, base: Path, axis: int | None, settings: tuple[str, ...], decimal: str | None, force: bool
+    data: Path,
+    output: Path,
+    base: Path,
+    axis: int | None,
+    settings: tuple[str, ...],
+    decimal: str | None,
+    force: bool,
 ) -> int:
-    """Look at the recording FILE; write which columns are which channels, in which units, and a base scenario.
+    """Look at the recording FILE; write a mapping (which column is what, in which unit) and a base scenario.
 
-    Behind every key of the mapping stands why. On a terminal you are asked for what the file does not tell; else
-    it stays a comment in the mapping, is listed, and the exit status is 1.
+    Behind every key of the mapping stands why. On a terminal you are asked for what the file does not tell;
+    else it stays a comment in the mapping, is listed, and the exit status is 1.
     """
     from hdsim.errors import InputError
     from hdsim.log.guess.base import base_scenario
     from hdsim.log.guess.draft import draft
     from hdsim.log.guess.text import to_text
-    from hdsim.log.mapping import Channels, Mapping, TimeSource
+    from hdsim.log.mapping import Form
 
     for path in (output, base):
         if path.exists() and (not force or (data.exists() and path.samefile(data))):
@@ -45,10 +62,7 @@ def mapping(
         if not path.parent.is_dir():
             raise InputError(f"{path}: no such folder: {path.parent}")
     said = dict(_pair(setting) for setting in settings)
-    form = None
-    if decimal is not None:
-        # Only its form counts: what is mapped is what is to be found.
-        form = Mapping.model_construct(decimal=decimal, time=TimeSource.model_construct(), channels=Channels())
+    form = Form.model_validate({"decimal": decimal})
     with reading(data) as tell:
         found = draft(data, said, axis, form, tell)
     while found.open and _asked(found, said):
@@ -63,7 +77,11 @@ def mapping(
             raise InputError(f"{path}: cannot be written ({error.strerror})") from None
     _show(found)
     click.echo(f"mapping  {output}")
-    click.echo(f"base     {base}" if scenario is not None else "base     none: it needs the ratio of a harmonic drive")
+    click.echo(
+        f"base     {base}"
+        if scenario is not None
+        else "base     none: it needs the ratio of a harmonic drive"
+    )
     for question in found.open:
         click.echo(f"open: {question}", err=True)
     return 1 if found.open else 0
@@ -108,9 +126,13 @@ def _show(found: Draft) -> None:
     for key, answer in rows:
         table.add_row(key, _value(answer.value), _coloured(answer.ground, colours), escape(answer.why))
     for name, channel in found.channels.items():
-        table.add_row(name, escape(channel.source.label), _coloured(channel.ground, colours), escape(channel.why))
+        table.add_row(
+            name, escape(channel.source.label), _coloured(channel.ground, colours), escape(channel.why)
+        )
         for key, answer in channel.keys.items():
-            table.add_row(f"  {key}", _value(answer.value), _coloured(answer.ground, colours), escape(answer.why))
+            table.add_row(
+                f"  {key}", _value(answer.value), _coloured(answer.ground, colours), escape(answer.why)
+            )
     console().print(table)
 
 
@@ -120,6 +142,6 @@ def _value(value: object) -> str:
     return "?" if value is None else f"{value:.9g}" if isinstance(value, float) else escape(str(value))
 
 
-def _coloured(ground: str, colours: dict[object, str]) -> str:
+def _coloured(ground: Ground, colours: dict[Ground, str]) -> str:
     colour = colours.get(ground)
     return f"[{colour}]{ground}[/]" if colour else str(ground)

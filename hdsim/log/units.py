@@ -80,7 +80,7 @@ def split_name(name: str) -> tuple[str, str]:
             return name[: -len(tail) - 1], unit
     head, bar, tail = lower.rpartition("_")
     if bar and head and (tail in _TAILS or tail in ("s", "a", "c")):
-        return name[: len(head)], tail
+        return name[: len(head)], name[len(head) + 1 :]
     # camelCase: speedRpm, angleDeg, torqueNm, currentA.
     camel = re.fullmatch(r"(.*[a-z0-9])((?:[mu]?[A-Z])[A-Za-z]*)", name)
     if camel and (camel[2].lower() in _TAILS or camel[2] == "A"):

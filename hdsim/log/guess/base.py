@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from hdsim.log.guess.findings import Draft
 
-#: Torsion of a drive from its rated torque, of CSG-20-100 (40 N m): stiffness per rated torque in 1/rad, and the
-#: ends of the segments. Harmonic Drive LLC, CSF/CSG catalogue.
+#: Torsion of a drive from its rated torque, of CSG-20-100 (40 N m): stiffness per rated torque in 1/rad, and
+#: the ends of the segments. Harmonic Drive LLC, CSF/CSG catalogue.
 _STIFFNESS = (400.0, 625.0, 725.0)
 _ENDS = (0.175, 0.625)
 #: Input inertias of that drive, kg m^2 per (N m)^(5/3): mass goes with the cube of the size, as torque does.
@@ -18,7 +18,8 @@ def base_scenario(draft: Draft) -> str | None:
     if ratio is None or abs(2 * ratio - round(2 * ratio)) > 1e-9:
         return None
     # Both arrangements have a difference of two teeth: with the circular spline held the output turns against
-    # the motor, at flexspline teeth over two; with the flexspline held along with it, at circular spline teeth over two.
+    # the motor, at flexspline teeth over two; with the flexspline held along with it, at circular spline
+    # teeth over two.
     larger = round(2 * abs(ratio))
     teeth = (larger - 2, larger) if ratio > 0 else (larger, larger + 2)
     held = "flexspline_fixed" if ratio > 0 else "circular_spline_fixed"
@@ -30,7 +31,7 @@ def base_scenario(draft: Draft) -> str | None:
     k1, k2, k3 = (f"{_rounded(k * rated):g}" for k in _STIFFNESS)
     t1, t2 = (f"{_rounded(t * rated):g}" for t in _ENDS)
     motor, generator = (f"{_rounded(i * rated ** (5 / 3)):.2e}" for i in _INERTIA)
-    return f"""# The plainest model for {draft.title}, drafted by hdsim mapping: ratio and inertia, nothing else.
+    return f"""# The plainest model for {draft.title}, by hdsim mapping: ratio and inertia, nothing else.
 # Only the ratio is the recording's. The other numbers are those of a CSG drive of this rated torque, scaled:
 # put your drive's own here, or a preset (hdsim presets).
 name: base for {_plain(draft.title)}

@@ -15,7 +15,7 @@ from hdsim.log.guess.relations import moves
 from hdsim.log.guess.survey import Survey, survey
 from hdsim.log.guess.timing import find_time
 from hdsim.log.guess.torque import map_torques
-from hdsim.log.mapping import Channels, Mapping
+from hdsim.log.mapping import Channels, Form
 from hdsim.log.readers.contract import Tell, missing, silent
 
 #: An axis moves where its travel is at least this share of the farthest one's.
@@ -28,7 +28,7 @@ def draft(
     path: Path,
     said: dict[str, str] | None = None,
     axis: int | None = None,
-    form: Mapping | None = None,
+    form: Form | None = None,
     tell: Tell = silent,
 ) -> Draft:
     """Find out what a file holds.
@@ -38,7 +38,7 @@ def draft(
         said: what the user knows: ``ratio``, ``time.unit``, ``time.rate_hz``, ``time.column``, and
             ``<column>.<key>`` with channel, unit, side, counts_per_turn or torque_constant_nm_per_a.
         axis: number of the axis, of a file with several.
-        form: a mapping that says how the file is to be read, or None.
+        form: how the file is to be read, as far as the user says.
         tell: hears how far the reading is.
 
     Raises:
@@ -53,13 +53,17 @@ def draft(
     for column in columns:
         if column.said.get("channel") == "none":
             found.unused[column.label] = "you say so"
-        elif column.values.dtype.kind == "M" or column.origin.column == _time_column(found):
+        elif column.values.dtype.kind == "M" or (
+            column.origin.topic is None and column.origin.column == _time_column(found)
+        ):
             continue
         elif not column.meaning.measured and "channel" not in column.said:
             found.unused[column.label] = "by its name no measurement"
         else:
             measured.append(column)
-    torque = next((c.values for c in measured if c.quantity in ("torque", "current") and moves(c.values)), None)
+    torque = next(
+        (c.values for c in measured if c.quantity in ("torque", "current") and moves(c.values)), None
+    )
     travels = _travels(seen.columns)
     number = map_motion(measured, travels, time, times, ratio, torque, many, found)
     map_torques([c for c in measured if c.quantity in ("torque", "current")], number, found)
@@ -93,11 +97,14 @@ def _take(columns: list[Candidate], said: dict[str, str], path: Path) -> tuple[d
             if column is None:
                 raise missing(path, "column", place, [c.label for c in columns])
             if name == "channel" and value not in (*Channels.model_fields, "none"):
-                raise InputError(f"--set {key}: found {value!r}, expected {', '.join(Channels.model_fields)} or none")
+                raise InputError(
+                    f"--set {key}: found {value!r}, expected {', '.join(Channels.model_fields)} or none"
+                )
             column.said[name] = value
         else:
             raise InputError(
-                f"--set {key}: expected ratio, time.KEY ({', '.join(_OF_TIME)}) or COLUMN.KEY ({', '.join(_OF_COLUMN)})"
+                f"--set {key}: expected ratio, time.KEY ({', '.join(_OF_TIME)}) or "
+                f"COLUMN.KEY ({', '.join(_OF_COLUMN)})"
             )
     return of_time, ratio
 
@@ -122,7 +129,9 @@ def _axis(seen: Survey, axis: int | None, found: Draft, path: Path) -> tuple[lis
         moving = [number for number in numbers if travel[number] > _MOVES]
         if len(moving) != 1:
             which = ", ".join(map(str, moving or numbers))
-            raise InputError(f"{path}: it holds the axes {which}: say which one (--axis {(moving or numbers)[0]})")
+            raise InputError(
+                f"{path}: it holds the axes {which}: say which one (--axis {(moving or numbers)[0]})"
+            )
         axis = moving[0]
         found.notes.append(f"axis {axis} of {len(numbers)}: the only one that moves")
     elif axis not in numbers:
@@ -140,7 +149,11 @@ def _travels(columns: list[Candidate]) -> dict[str, float]:
     """Range of the angles and top speed of the velocities of each stem, over all axes."""
     found: dict[str, float] = {}
     for column in columns:
-        if column.quantity in ("angle", "velocity") and column.values.dtype.kind == "f" and moves(column.values):
+        if (
+            column.quantity in ("angle", "velocity")
+            and column.values.dtype.kind == "f"
+            and moves(column.values)
+        ):
             finite = column.values[np.isfinite(column.values)]
             size = np.ptp(finite) if column.quantity == "angle" else np.quantile(np.abs(finite), 0.99)
             found[column.meaning.stem] = max(found.get(column.meaning.stem, 0.0), float(size))
@@ -150,11 +163,15 @@ def _travels(columns: list[Candidate]) -> dict[str, float]:
 def _temperature(measured: list[Candidate], found: Draft) -> None:
     columns = [c for c in measured if c.quantity == "temperature"]
     # The housing's is wanted; a motor's winding is something else.
-    columns.sort(key=lambda c: ("channel" not in c.said, c.meaning.side == "motor", "housing" not in c.meaning.marks))
+    columns.sort(
+        key=lambda c: ("channel" not in c.said, c.meaning.side == "motor", "housing" not in c.meaning.marks)
+    )
     for column in columns:
         wound = column.meaning.side == "motor" or "winding" in column.meaning.marks
         if "temperature" in found.channels or (wound and "channel" not in column.said):
-            found.unused[column.label] = "not the housing's temperature" if wound else "another temperature is mapped"
+            found.unused[column.label] = (
+                "not the housing's temperature" if wound else "another temperature is mapped"
+            )
             continue
         stated = stated_unit(column)
         middle = float(np.nanmedian(column.values))
@@ -169,7 +186,7 @@ def _temperature(measured: list[Candidate], found: Draft) -> None:
 
 def _ratio(found: Draft, ratio: float | None) -> None:
     """Ask for the ratio where a channel needs it and nothing tells it."""
-    if ratio is not None:
+    if ratio is not None or found.ratio is not None:
         return
     needing = [
         name

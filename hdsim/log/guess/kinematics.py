@@ -11,9 +11,12 @@ from hdsim.log.guess.motion import Motion, solve
 from hdsim.log.guess.readings import Reading, physical_side, readings, stated_unit
 from hdsim.log.guess.relations import Array, moves, turn_of, unwound
 
-#: What costs no more than this over the best is as usual: the question stays open. Beyond the second it is out.
+#: What costs no more than this over the best is as usual: the question stays open. Beyond the second it is
+#: out.
 USUAL = 0.8
 POSSIBLE = 5.0
+#: For the side of a column whose name does not say it: so much beyond the usual size of the other side.
+USUAL_SIDE = 1.2
 _INTEGER = 0.004
 
 
@@ -54,7 +57,7 @@ def map_motion(
         return ratio
     number = _ratio(motion, ratio, columns, draft)
     for k in sorted(range(len(columns)), key=lambda k: -len(np.unique(columns[k].values))):
-        _add(k, columns[k], motion, turns[k], columns[motion.reference], draft)
+        _add(k, columns, motion, turns[k], draft)
     return number
 
 
@@ -67,7 +70,8 @@ def _unit_of_time(motion: Motion | None, times: dict[str, tuple[float, float]], 
     if "column" not in draft.time or "unit" in draft.time:
         return
     best = motion.time if motion is not None else min(times, key=lambda unit: times[unit][1])
-    costs = (motion.costs[("time", 0)] if motion is not None else {u: c for u, (_, c) in times.items()})  # type: ignore[misc]
+    alone: dict[object, float] = {unit: cost for unit, (_, cost) in times.items()}
+    costs = motion.costs[("time", 0)] if motion is not None else alone
     draft.time["unit"] = _judged(
         best, costs, "the only one that fits spacing and slopes", "from the spacing of the samples"
     )
@@ -75,13 +79,19 @@ def _unit_of_time(motion: Motion | None, times: dict[str, tuple[float, float]], 
         draft.ask(f"the unit of the time, {draft.time['unit'].why}", "time.unit", str(best))
 
 
-def _judged(best: object, costs: dict[object, float], shown: str, assumed: str) -> Answer:
+def _judged(
+    best: object, costs: dict[object, float], shown: str, assumed: str, usual: float = USUAL
+) -> Answer:
     """An answer whose ground is how unusual the other values are."""
-    rivals = sorted((cost, str(value)) for value, cost in costs.items() if value != best)
+    rivals = sorted(
+        (cost, f"{value:.10g}" if isinstance(value, float) else str(value))
+        for value, cost in costs.items()
+        if value != best
+    )
     if not rivals or rivals[0][0] > POSSIBLE:
         return Answer(best, Ground.SHOWN, shown)
     possible = ", ".join(value for cost, value in rivals if cost <= POSSIBLE)
-    if rivals[0][0] > USUAL:
+    if rivals[0][0] > usual:
         return Answer(best, Ground.ASSUMED, f"{assumed}; the numbers would allow {possible}")
     return Answer(None, Ground.OPEN, f"{best} or {possible}")
 
@@ -90,7 +100,11 @@ def _ratio(motion: Motion, said: float | None, columns: list[Candidate], draft: 
     if said is not None:
         sign = math.copysign(1.0, motion.ratio) if motion.ratio else math.copysign(1.0, said)
         if motion.ratio and sign != math.copysign(1.0, said):
-            draft.ask(f"the sign of the ratio: you say {said:g}, the angles turn the other way", "ratio", f"{-said:g}")
+            draft.ask(
+                f"the sign of the ratio: you say {said:g}, the angles turn the other way",
+                "ratio",
+                f"{-said:g}",
+            )
         draft.ratio = Answer(said, Ground.SAID)
         return said
     if motion.ratio is None:
@@ -98,11 +112,13 @@ def _ratio(motion: Motion, said: float | None, columns: list[Candidate], draft: 
     whole = round(motion.ratio)
     near = abs(motion.ratio - whole) < _INTEGER * abs(whole)
     value = float(whole) if near else float(f"{motion.ratio:.6g}")
+    by_angle = {column.label for column in columns if column.quantity == "angle"}
     across = [
         columns[k].label
         for k, reading in motion.best.items()
         if reading is not None and reading.side != motion.best[motion.reference].side  # type: ignore[union-attr]
     ]
+    across = [label for label in across if label in by_angle] or across
     why = f"slope {motion.ratio:.5g} between {columns[motion.reference].label} and {', '.join(across)}"
     costs = {round(float(v), 3): c for v, c in motion.costs[("ratio", 0)].items() if v is not None}  # type: ignore[arg-type]
     rivals = [v for v, c in costs.items() if c <= USUAL and abs(v - motion.ratio) > 0.05 * abs(v)]
@@ -117,7 +133,8 @@ def _ratio(motion: Motion, said: float | None, columns: list[Candidate], draft: 
     return value
 
 
-def _add(k: int, column: Candidate, motion: Motion, turn: float | None, reference: Candidate, draft: Draft) -> None:
+def _add(k: int, columns: list[Candidate], motion: Motion, turn: float | None, draft: Draft) -> None:
+    column, reference = columns[k], columns[motion.reference]
     best = motion.best.get(k)
     if best is None:
         draft.unused[column.label] = f"as no unit does it go with {reference.label}"
@@ -128,11 +145,12 @@ def _add(k: int, column: Candidate, motion: Motion, turn: float | None, referenc
         )
         return
     costs = motion.costs[("reading", k)]
-    fitted = k in motion.slopes or len(motion.slopes) > 0
-    keys: dict[str, Answer] = {"unit": _unit(column, best, costs, reference, fitted, draft)}
+    fitted = k in motion.slopes or (k == motion.reference and len(motion.slopes) > 0)
+    beside = ", ".join(columns[j].label for j in motion.slopes) if k == motion.reference else reference.label
+    keys: dict[str, Answer] = {"unit": _unit(column, best, costs, beside, fitted, draft)}
     if best.unit == "count":
         keys["counts_per_turn"] = _counts(column, best, costs)
-    side, why, ground = _side(column, best, costs)
+    side, why, ground = _side(column, best, costs, motion)
     name = f"{physical_side(column) or side}_{column.quantity}"
     if name in draft.channels:
         draft.unused[column.label] = f"{draft.channels[name].source.label} is {name} already, in finer steps"
@@ -159,18 +177,20 @@ def _add(k: int, column: Candidate, motion: Motion, turn: float | None, referenc
 
 
 def _unit(
-    column: Candidate, best: Reading, costs: dict[object, float], reference: Candidate, fitted: bool, draft: Draft
+    column: Candidate, best: Reading, costs: dict[object, float], beside: str, fitted: bool, draft: Draft
 ) -> Answer:
     stated = stated_unit(column)
     if best.contradicts:
-        why = f"the file says {stated}, the numbers fit {best.unit} (beside {reference.label})"
+        why = f"the file says {stated}, the numbers fit {best.unit} (beside {beside})"
         draft.ask(f"the unit of {column.label}: {why}", f"{column.label}.unit", best.unit)
         return Answer(None, Ground.OPEN, why)
     if "unit" in column.said:
         return Answer(best.unit, Ground.SAID)
     if stated:
         agrees = "; the slopes agree" if fitted else ""
-        return Answer(best.unit, Ground.STATED, f"the file says {column.meaning.unit.strip() or stated!r}{agrees}")
+        return Answer(
+            best.unit, Ground.STATED, f"the file says {column.meaning.unit.strip() or stated!r}{agrees}"
+        )
     by_unit: dict[object, float] = {}
     for reading, cost in costs.items():
         if isinstance(reading, Reading):
@@ -187,10 +207,14 @@ def _counts(column: Candidate, best: Reading, costs: dict[object, float]) -> Ans
             of_counts[reading.counts] = min(cost, of_counts.get(reading.counts, math.inf))
     answer = _judged(best.counts, of_counts, "from its slope", "the usual one that fits")
     power = math.log2(best.counts or 1.0)
-    return Answer(answer.value, answer.ground, f"2^{power:.0f}: {answer.why}" if power % 1 == 0 else answer.why)
+    return Answer(
+        answer.value, answer.ground, f"2^{power:.0f}: {answer.why}" if power % 1 == 0 else answer.why
+    )
 
 
-def _side(column: Candidate, best: Reading, costs: dict[object, float]) -> tuple[str, str, Ground]:
+def _side(
+    column: Candidate, best: Reading, costs: dict[object, float], motion: Motion
+) -> tuple[str, str, Ground]:
     """Side to which the numbers refer, why, and how sure that is."""
     if "channel" in column.said or "side" in column.said:
         return best.side, "you say so", Ground.SAID
@@ -201,5 +225,9 @@ def _side(column: Candidate, best: Reading, costs: dict[object, float]) -> tuple
     for reading, cost in costs.items():
         if isinstance(reading, Reading):
             of_side[reading.side] = min(cost, of_side.get(reading.side, math.inf))
-    answer = _judged(best.side, of_side, f"the numbers refer to the {best.side}", f"taken for the {best.side}'s")
+    why = f"the numbers refer to the {best.side}"
+    answer = _judged(best.side, of_side, why, f"taken for the {best.side}'s", USUAL_SIDE)
+    if answer.ground == Ground.SHOWN and motion.ratio is None:
+        # Only a slope over the other side would show it.
+        return best.side, f"taken for the {best.side}'s, by its size and name", Ground.ASSUMED
     return best.side, answer.why, answer.ground

@@ -1,6 +1,6 @@
 """Units, sides and ratio of the angles and velocities of one axis, as far as the numbers tell.
 
-With R = 1 for numbers that refer to the output and R = N for those of the motor, every column of one motion is
+With R = 1 for numbers that refer to the output and R = N for those of the motor, each column of a motion is
 R times the output's angle or its derivative. The slope of a column over a reference column is thus known from
 their units, the time's unit and N. All readings (`readings.py`) are tried; those whose slope is another than
 the measured one are out. What is common to all that are left is shown by the data; otherwise the usual one is
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hdsim.log.guess.findings import Candidate
-from hdsim.log.guess.readings import UNFIT, Reading
+from hdsim.log.guess.readings import CONTRADICTED, UNFIT, Reading
 from hdsim.log.guess.relations import Array, Slope, integral, slope
 
 #: Relative difference of slopes that are taken to be the same: of angles, and where a velocity takes part.
@@ -24,8 +24,10 @@ TOLERANCE = 0.01
 TOLERANCE_OF_VELOCITY = 0.04
 #: Ratios that are made in series.
 SERIES = (30, 50, 51, 80, 81, 100, 101, 120, 121, 160, 161)
-#: Costs of a ratio that is not made in series, of one that is unusually small, and of one that is no integer.
-NO_SERIES, SMALL, NO_INTEGER = 0.7, 2.0, 5.0
+#: Costs of a ratio that is not made in series, of one beyond what is made at all, and of one that is no
+#: integer: more than that of a unit which the file states wrongly.
+NO_SERIES, BEYOND, NO_INTEGER = 1.5, 2.0, CONTRADICTED + 1.0
+_MADE = (25, 320)
 _INTEGER = 0.004
 _NO_FAMILY = 1.0
 
@@ -41,8 +43,8 @@ class Motion:
         best: the least unusual reading of every column, by its place; None where no column was given.
         time: unit of time that goes with it.
         ratio: signed ratio that goes with it, or None where all refer to one side.
-        costs: by what is decided and each value that it may take, the least cost of all beside it, over the best.
-        slopes: of the columns over the reference, by place.
+        costs: by what is decided and each value that it may take, the least cost of all beside it, over the
+        best. slopes: of the columns over the reference, by place.
         reference: its place.
         signs: direction of each column, by place.
     """
@@ -149,11 +151,21 @@ def _slopes(
 
 
 def _fitting(
-    columns: list[Candidate], options: list[Reading], each: Slope, first: Reading, second: float, k: int, reference: int
+    columns: list[Candidate],
+    options: list[Reading],
+    each: Slope,
+    first: Reading,
+    second: float,
+    k: int,
+    reference: int,
 ) -> Iterable[tuple[Reading, float | None]]:
     """Readings of a column that go with the reference's; with the ratio that they ask for, or None."""
     of_velocity = columns[k].quantity != columns[reference].quantity
-    tolerance = TOLERANCE_OF_VELOCITY if "velocity" in (columns[k].quantity, columns[reference].quantity) else TOLERANCE
+    tolerance = (
+        TOLERANCE_OF_VELOCITY
+        if "velocity" in (columns[k].quantity, columns[reference].quantity)
+        else TOLERANCE
+    )
     for reading in options:
         quotient = each.factor * reading.scale / first.scale * (second if of_velocity else 1.0)
         if reading.side == first.side:
@@ -169,7 +181,9 @@ def _ratios(fits: dict[int, list[tuple[Reading, float | None]]], said: float | N
     asked: list[float] = []
     for readings in fits.values():
         for _, each in readings:
-            if each is not None and not any(abs(each - known) < TOLERANCE_OF_VELOCITY * abs(known) for known in asked):
+            if each is not None and not any(
+                abs(each - known) < TOLERANCE_OF_VELOCITY * abs(known) for known in asked
+            ):
                 asked.append(each)
     if said is not None:
         asked = [each for each in asked if abs(abs(each) - abs(said)) < TOLERANCE_OF_VELOCITY * abs(said)]
@@ -182,11 +196,14 @@ def _of_ratio(ratio: float | None) -> float:
     whole = round(abs(ratio))
     cost = 0.0 if abs(abs(ratio) - whole) < _INTEGER * whole else NO_INTEGER
     cost += 0.0 if whole in SERIES else NO_SERIES
-    return cost + (SMALL if abs(ratio) < 25 else 0.0)
+    return cost + (0.0 if _MADE[0] <= abs(ratio) <= _MADE[1] else BEYOND)
 
 
 def _table(
-    fitting: list[tuple[Reading, float | None]] | None, options: list[Reading], first: Reading, ratio: float | None
+    fitting: list[tuple[Reading, float | None]] | None,
+    options: list[Reading],
+    first: Reading,
+    ratio: float | None,
 ) -> dict[Reading | None, float]:
     """Cost of each reading of a column beside the reference's and a ratio; None for that none fits."""
     if fitting is None:  # no clear relation: every reading is possible

@@ -1,7 +1,7 @@
 """What a column of angles or velocities may mean: its units and sides, each with how unusual it would be.
 
-Costs are orders of magnitude of disbelief: 1 is ten times less usual. They order what the numbers leave open, and
-never overrule them.
+Costs are orders of magnitude of disbelief: 1 is ten times less usual. They order what the numbers leave
+open, and never overrule them.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from hdsim.log.guess.relations import Array, step_of, turn_of
 from hdsim.log.mapping import ANGLE_UNITS, VELOCITY_UNITS
 from hdsim.log.units import unit_of
 
-#: Usual travel in rad and usual top speed in rad/s of either side; each decade beyond costs 1.
+#: Usual travel in rad and usual top speed in rad/s of either side; each decade above costs 1, below a half:
+#: a locked drive and a slow test are no rarity.
 USUAL = {
-    ("angle", "output"): (0.1, 60.0),
+    ("angle", "output"): (1.0, 60.0),
     ("angle", "motor"): (3.0, 6000.0),
-    ("velocity", "output"): (0.1, 12.0),
+    ("velocity", "output"): (0.5, 12.0),
     ("velocity", "motor"): (5.0, 900.0),
 }
 #: Turns of encoders in counts: powers of two, and what optical discs have (with four edges a line).
@@ -29,8 +30,17 @@ TURNS = (*(2.0**n for n in range(8, 33)), 360.0, 500.0, 1000.0, 2000.0, 2500.0, 
 #: Cost of a unit that the file contradicts, and of a column that no unit fits.
 CONTRADICTED = 7.0
 UNFIT = 9.0
-_STEP_SHOWS = 3.0
-_FAMILY = {"rad": "rad", "deg": "deg", "rad/s": "rad", "deg/s": "deg", "rpm": "", "rev": "", "rev/s": "", "count": ""}
+_STEP_SHOWS = 6.0
+_FAMILY = {
+    "rad": "rad",
+    "deg": "deg",
+    "rad/s": "rad",
+    "deg/s": "deg",
+    "rpm": "",
+    "rev": "",
+    "rev/s": "",
+    "count": "",
+}
 
 
 @dataclass(frozen=True)
@@ -63,7 +73,10 @@ def stated_unit(column: Candidate) -> str:
     if "unit" in column.said:
         return column.said["unit"]
     known = unit_of(column.meaning.unit)
-    fits = known is not None and known[0] in (column.quantity, "current" if column.quantity == "torque" else "")
+    fits = known is not None and known[0] in (
+        column.quantity,
+        "current" if column.quantity == "torque" else "",
+    )
     return known[1] if known is not None and fits else ""
 
 
@@ -96,8 +109,7 @@ def readings(column: Candidate, values: Array, travel: float, many_axes: bool) -
     for side, of_side in _sides(column, many_axes).items():
         low, high = USUAL[kind, side]
         for unit, cost in options.items():
-            size = travel * known[unit]
-            beyond = abs(math.log10(size / min(max(size, low), high))) if size > 0 else 0.0
+            beyond = _beyond(travel * known[unit], low, high)
             if stated == unit:
                 found.append(Reading(unit, known[unit], side, of_side))
             elif "unit" not in column.said:
@@ -120,14 +132,19 @@ def _counted(
     low, high = USUAL["angle", side]
     found = []
     for counts in (float(said),) if said else TURNS:
-        size = travel * 2 * math.pi / counts
-        beyond = abs(math.log10(size / min(max(size, low), high))) if size > 0 else 0.0
+        beyond = _beyond(travel * 2 * math.pi / counts, low, high)
         if turn is not None and not math.isclose(turn, counts, rel_tol=0.01):
             beyond += 4.0
         odd = 0.0 if math.log2(counts) % 1 == 0 else 0.5
         cost = of_side + (0.0 if said else beyond + odd) + (0.0 if stated else 1.0)
         found.append(Reading("count", 2 * math.pi / counts, side, cost, counts))
     return found
+
+
+def _beyond(size: float, low: float, high: float) -> float:
+    if size <= 0:
+        return 0.0
+    return max(math.log10(size / high), 0.5 * math.log10(low / size), 0.0)
 
 
 def _sides(column: Candidate, many_axes: bool) -> dict[str, float]:

@@ -35,7 +35,7 @@ class Slope:
 def moves(values: Array) -> bool:
     """Whether a column has more than one value, of usable size."""
     finite = values[np.isfinite(values)]
-    return len(finite) > 2 and 0 < np.ptp(finite) < 1e30
+    return len(finite) > 2 and bool(0 < np.ptp(finite) < 1e30)
 
 
 def slope(y: Array, x: Array, beside: Array | None = None) -> Slope | None:

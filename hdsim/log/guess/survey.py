@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hdsim.errors import InputError
 from hdsim.log.guess.findings import Candidate
 from hdsim.log.guess.words import meaning
-from hdsim.log.mapping import Mapping, Origin
+from hdsim.log.mapping import Form, Origin
 from hdsim.log.readers import format_of
 from hdsim.log.readers.contract import Numbers, Table, Tell, silent
 from hdsim.log.readers.topics import Messages, fields_of, read_topics
@@ -19,6 +19,8 @@ from hdsim.log.readers.topics import Messages, fields_of, read_topics
 #: Most numbers that are looked at, over all columns: 160 MB.
 MOST_NUMBERS = 20_000_000
 _FEWEST = 3
+#: Units of sensor_msgs/JointState, by its definition (for revolute joints).
+_OF_JOINTS = {"position": "rad", "velocity": "rad/s", "effort": "Nm"}
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,12 @@ class Survey:
     stamps: NDArray[np.float64] | None = None
 
 
-def survey(path: Path, form: Mapping | None = None, tell: Tell = silent) -> Survey:
+def survey(path: Path, form: Form | None = None, tell: Tell = silent) -> Survey:
     """Look at a file.
 
     Args:
         path: the file.
-        form: a mapping that says how to read it, or None.
+        form: how it is to be read, as far as the user says.
         tell: hears how far the reading is.
 
     Raises:
@@ -110,6 +112,7 @@ def _messages(path: Path, title: str, messages: Messages) -> Survey:
             if topic != lead:
                 values = np.interp(time, own, values, left=np.nan, right=np.nan)
             joint = f" of {origin.joint}" if origin.joint else ""
-            words = meaning(" ".join([origin.joint or "", topic.replace("/", " "), origin.field or ""]))
+            unit = _OF_JOINTS.get(str(origin.field), "") if origin.joint else ""
+            words = meaning(" ".join([origin.joint or "", topic.replace("/", " "), origin.field or ""]), unit)
             found.append(Candidate(origin, f"{topic} {origin.field}{joint}", words, values))
     return Survey(found, [f"{title}, {len(topics)} topics"], lead, time)

@@ -6,20 +6,23 @@ from collections import defaultdict
 from typing import Any
 
 from hdsim.log.guess.findings import Answer, Candidate, Draft, Ground
-from hdsim.log.mapping import Mapping
+from hdsim.log.mapping import Form
 from hdsim.scenario.writer import to_yaml
 
 _WIDTH = 110
 
 
-def to_text(draft: Draft, form: Mapping | None = None) -> str:
+def to_text(draft: Draft, form: Form | None = None) -> str:
     """YAML of a mapping. What is open stands as a comment, so that the rest can be used.
 
     Args:
         draft: the draft.
-        form: the mapping that said how to read the file, or None.
+        form: how the file was to be read, as far as the user says.
     """
-    lines = [f"# Mapping of {draft.title}, drafted by hdsim mapping.", *_wrapped("; ".join(draft.notes) + ".")]
+    lines = [
+        f"# Mapping of {draft.title}, drafted by hdsim mapping.",
+        *_wrapped("; ".join(draft.notes) + "."),
+    ]
     lines += ["# Behind each key stands why; what is assumed wants a look, what is OPEN an answer."]
     if form is not None:
         given = form.model_dump(include={"format", "separator", "decimal", "encoding", "skip_lines"},

@@ -13,14 +13,17 @@ from hdsim.log.guess.survey import Survey
 from hdsim.log.mapping import TIME_UNITS
 from hdsim.log.units import unit_of
 
-#: Usual rates of recordings, Hz; each decade beyond costs 1. So does a unit that a fractional number seldom has.
+#: Usual rates of recordings, Hz; each decade beyond costs 1. So does a unit that a fractional number seldom
+#: has.
 USUAL_HZ = (50.0, 20_000.0)
 _OF_UNIT = {"s": 0.0, "ms": 0.3, "us": 0.5, "ns": 1.0}
 _FRACTIONS = {"s": 0.0, "ms": 1.0, "us": 2.0, "ns": 3.0}
 _COUNTER_FALLS = 0.02
 
 
-def find_time(survey: Survey, said: dict[str, str], draft: Draft) -> tuple[Array, dict[str, tuple[float, float]]]:
+def find_time(
+    survey: Survey, said: dict[str, str], draft: Draft
+) -> tuple[Array, dict[str, tuple[float, float]]]:
     """Write what is known of the time into the draft.
 
     Returns:
@@ -28,7 +31,9 @@ def find_time(survey: Survey, said: dict[str, str], draft: Draft) -> tuple[Array
     """
     count = len(survey.columns[0].values)
     if survey.stamps is not None:
-        draft.time["topic"] = Answer(survey.topic, Ground.SHOWN, "the topic with the most messages; their stamps count")
+        draft.time["topic"] = Answer(
+            survey.topic, Ground.SHOWN, "the topic with the most messages; their stamps count"
+        )
         return _increasing(survey.stamps), {"s": (1.0, 0.0)}
     if "rate_hz" in said:
         rate = float(said["rate_hz"])
@@ -54,7 +59,9 @@ def find_time(survey: Survey, said: dict[str, str], draft: Draft) -> tuple[Array
     time = _ticks(_unwrapped(np.asarray(column.values, np.float64), draft), draft)
     unit = said.get("unit") or _stated(column)
     if unit:
-        draft.time["unit"] = Answer(unit, Ground.SAID if "unit" in said else Ground.STATED, _words(column, said))
+        draft.time["unit"] = Answer(
+            unit, Ground.SAID if "unit" in said else Ground.STATED, _words(column, said)
+        )
         return time, {unit: (TIME_UNITS[unit], 0.0)}
     step = float(np.median(np.diff(time)))
     whole = bool(np.all(time % 1 == 0))
@@ -65,7 +72,9 @@ def find_time(survey: Survey, said: dict[str, str], draft: Draft) -> tuple[Array
         beyond = abs(math.log10(rate / min(max(rate, low), high)))
         costs[unit] = (second, beyond + (_OF_UNIT if whole else _FRACTIONS)[unit])
     least = min(cost for _, cost in costs.values())
-    return time, {unit: (second, cost - least) for unit, (second, cost) in costs.items() if cost - least < 6.0}
+    return time, {
+        unit: (second, cost - least) for unit, (second, cost) in costs.items() if cost - least < 6.0
+    }
 
 
 def _stated(column: Candidate) -> str:
@@ -97,7 +106,9 @@ def _counts(column: Candidate) -> bool:
     steps = np.diff(column.values)
     if steps.dtype.kind == "m":
         return True
-    return bool(np.all(np.isfinite(column.values)) and (steps > 0).any() and (steps < 0).mean() < _COUNTER_FALLS)
+    return bool(
+        np.all(np.isfinite(column.values)) and (steps > 0).any() and (steps < 0).mean() < _COUNTER_FALLS
+    )
 
 
 def _unwrapped(values: Array, draft: Draft) -> Array:
@@ -112,10 +123,13 @@ def _unwrapped(values: Array, draft: Draft) -> Array:
     period = power if abs(np.median(spans) - power) < 0.02 * power else float(np.round(np.median(spans), 6))
     if float(np.ptp(spans)) > 0.1 * period or float(np.min(before)) < 0.9 * period:
         draft.time["wraps_at"] = Answer(None, Ground.OPEN, f"it falls {len(falls)} times, at no fixed number")
-        draft.ask(f"the time falls {len(falls)} times, first after sample {falls[0] + 1}: cut or sort the recording")
-        return np.arange(len(values)) * step
+        draft.ask(
+            f"the time falls {len(falls)} times, first after sample {falls[0] + 1}: cut or sort the recording"
+        )
+        return np.arange(len(values), dtype=np.float64) * step
     draft.time["wraps_at"] = Answer(period, Ground.SHOWN, f"it starts anew {len(falls)} times")
-    return np.unwrap(values, period=period)
+    joined: Array = np.unwrap(values, period=period).astype(np.float64)
+    return joined
 
 
 def _ticks(time: Array, draft: Draft) -> Array:
@@ -123,7 +137,9 @@ def _ticks(time: Array, draft: Draft) -> Array:
     same = np.diff(time) == 0
     if (np.diff(time) < 0).any() or not same.any():
         return time
-    draft.time["quantised"] = Answer(True, Ground.SHOWN, f"{int(same.sum())} samples share the time of the one before")
+    draft.time["quantised"] = Answer(
+        True, Ground.SHOWN, f"{int(same.sum())} samples share the time of the one before"
+    )
     return spread(time, draft.title)
 
 

@@ -9,7 +9,8 @@ from hdsim.log.guess.readings import stated_unit
 from hdsim.log.guess.relations import moves, slope
 from hdsim.log.mapping import CURRENT_UNITS, TORQUE_UNITS
 
-#: Torque constants of motors that drive harmonic drives lie below this, N m/A; a larger one refers to the output.
+#: Torque constants of motors that drive harmonic drives lie below this, N m/A; a larger one refers to the
+#: output.
 LARGEST_CONSTANT = 1.0
 #: Largest torque of such motors at their own shaft, N m.
 LARGEST_MOTOR = 30.0
@@ -39,10 +40,12 @@ def map_torques(columns: list[Candidate], ratio: float | None, draft: Draft) -> 
         elif known:
             draft.unused[column.label] = f"beside {', '.join(sorted(known))} nothing says which torque it is"
         else:
-            channel = Channel(column, {"unit": _unit(column)}, "a torque of the motor, or at the output?", Ground.OPEN)
+            channel = Channel(
+                column, {"unit": _unit(column)}, "a torque of the motor, or at the output?", Ground.OPEN
+            )
             draft.channels["output_torque"] = channel
             draft.ask(
-                f"whether {column.label} is motor_torque, output_torque (of the drive) or load_torque (external)",
+                f"whether {column.label} is motor_torque, output_torque (of the drive) or load_torque",
                 f"{column.label}.channel",
                 "motor_torque",
             )
@@ -84,7 +87,9 @@ def _unit(column: Candidate) -> Answer:
     stated = stated_unit(column)
     if stated in TORQUE_UNITS:
         said = "unit" in column.said
-        return Answer(stated, Ground.SAID if said else Ground.STATED, "" if said else f"the file says {stated}")
+        return Answer(
+            stated, Ground.SAID if said else Ground.STATED, "" if said else f"the file says {stated}"
+        )
     return Answer("N m", Ground.ASSUMED, "no unit is stated")
 
 
@@ -113,7 +118,9 @@ def _currents(currents: list[Candidate], draft: Draft) -> None:
         stated = stated_unit(column)
         constant = column.said.get("torque_constant_nm_per_a")
         keys = {
-            "unit": Answer(stated or "A", Ground.STATED if stated else Ground.ASSUMED, "" if stated else "a current"),
+            "unit": Answer(
+                stated or "A", Ground.STATED if stated else Ground.ASSUMED, "" if stated else "a current"
+            ),
             "torque_constant_nm_per_a": Answer(float(constant), Ground.SAID)
             if constant
             else Answer(None, Ground.OPEN, "torque of one ampere"),
@@ -132,7 +139,8 @@ def _hint(column: Candidate, draft: Draft) -> str:
     found = slope(sensor.source.values, column.values) if sensor is not None else None
     if sensor is None or found is None or found.explained < 0.5:
         return ""
-    return f" ({sensor.source.label} rises by about {abs(found.factor):.2g} of its units with one of the current's)"
+    rise = f"{abs(found.factor):.2g} of its units"
+    return f" ({sensor.source.label} rises by about {rise} with one of the current's)"
 
 
 def _sides(currents: list[Candidate], ratio: float | None, draft: Draft) -> None:
@@ -165,7 +173,9 @@ def _side(motor: Channel, currents: list[Candidate], ratio: float | None, draft:
     if unit not in TORQUE_UNITS:
         constant = motor.keys["torque_constant_nm_per_a"].value
         if constant is not None and constant > LARGEST_CONSTANT:
-            return Answer("output", Ground.ASSUMED, f"{constant:.3g} N m/A is too much at a motor's own shaft")
+            return Answer(
+                "output", Ground.ASSUMED, f"{constant:.3g} N m/A is too much at a motor's own shaft"
+            )
         return None
     scale = TORQUE_UNITS[unit]
     output = draft.channels.get("output_torque")
@@ -184,7 +194,9 @@ def _side(motor: Channel, currents: list[Candidate], ratio: float | None, draft:
             if constant > LARGEST_CONSTANT:
                 why = f"{constant:.3g} N m/A of {current.label} is too much at a motor's own shaft"
                 return Answer("output", Ground.ASSUMED, why)
-            return Answer("motor", Ground.ASSUMED, f"{constant:.3g} N m/A of {current.label} is a motor's own")
+            return Answer(
+                "motor", Ground.ASSUMED, f"{constant:.3g} N m/A of {current.label} is a motor's own"
+            )
     largest = float(np.nanquantile(np.abs(motor.source.values), 0.999)) * scale
     if largest > LARGEST_MOTOR:
         return Answer("output", Ground.ASSUMED, f"{largest:.0f} N m is too much at a motor's own shaft")

@@ -12,36 +12,44 @@ from hdsim.log.units import split_name, unit_of
 WORDS: dict[str, str] = {
     # quantities
     "time": "time zeit timestamp stamp uhrzeit zeitstempel datum date datetime temps tiempo tempo clock t",
-    "angle": "angle angles position positions pos winkel drehwinkel lage theta phi q encoder enc drehgeber geber "
-    "stellung winkellage posizione posicion angulo angolo inc increments resolver qpos",
-    "velocity": "velocity velocities vel speed omega drehzahl geschwindigkeit winkelgeschwindigkeit dq qd qdot w "
-    "vitesse velocidad velocita rpm dps qvel n",
+    "angle": "angle angles position positions pos winkel drehwinkel lage theta phi q encoder enc "
+    "drehgeber geber stellung winkellage posizione posicion angulo angolo inc increments "
+    "resolver qpos",
+    "velocity": "velocity velocities vel speed omega drehzahl geschwindigkeit winkelgeschwindigkeit "
+    "dq qd qdot w vitesse velocidad velocita rpm dps qvel n",
     "acceleration": "acceleration accelerations accel acc qdd ddq beschleunigung winkelbeschleunigung",
     "torque": "torque torques trq tau moment momente drehmoment mom couple coppia par effort tq nm m",
     "current": "current currents curr cur strom stroeme iq amp amps ampere corrente corriente courant i",
     "temperature": "temperature temp temperatur temperaturen tcase temperatura",
     # sides
-    "motor": "motor mot motors input inp in antrieb antriebs motorseite antriebsseite eingang wg wavegenerator "
-    "wave generator rotor eingangs moteur primary",
-    "output": "output out abtrieb abtriebs abtriebsseite joint joints gelenk gelenke link arm ausgang ausgangs flange "
-    "flansch secondary achse achs axis axes lastseite",
+    "motor": "motor mot motors input inp in antrieb antriebs motorseite antriebsseite eingang wg "
+    "wavegenerator wave generator rotor eingangs moteur primary",
+    "output": "output out abtrieb abtriebs abtriebsseite joint joints gelenk gelenke link arm "
+    "ausgang ausgangs flange flansch secondary achse achs axis axes lastseite",
     "load": "load last brake bremse bremsen external extern ext",
     # kinds
-    "sensor": "sensor sm sensed measured meas mess gemessen ist istwert actual act real cell lc zelle messwelle dms "
-    "transducer aufnehmer",
-    "reference": "cmd cmptd command commanded commands target desired des ref reference setpoint soll sollwert "
-    "demand demanded sp consigne goal control vorgabe fuehrung",
-    "estimate": "model modell est estimate estimated calc calculated computed berechnet observer predicted sim "
-    "simulated filtered",
-    "difference": "error errors err fehler abweichung deviation diff difference lag schlepp schleppfehler residual",
-    "other": "state status fault mode flag nr number index idx id sample samples test cycle count zaehler pose twist "
-    "wrench force kraft voltage spannung volt u power leistung pressure humidity fts imu gravity",
+    "sensor": "sensor sm sensed measured meas mess gemessen ist istwert actual act real cell lc "
+    "zelle messwelle dms transducer aufnehmer",
+    "reference": "cmd cmptd command commanded commands target desired des ref reference setpoint soll "
+    "sollwert demand demanded sp consigne goal control vorgabe fuehrung",
+    "estimate": "model modell est estimate estimated calc calculated computed berechnet observer "
+    "predicted sim simulated",
+    "difference": "error errors err fehler abweichung deviation diff difference lag schlepp "
+    "schleppfehler residual",
+    "other": "state status fault mode flag nr number index idx id sample samples test cycle pose "
+    "twist wrench force kraft voltage spannung volt u power leistung pressure humidity "
+    "fts imu gravity",
     "housing": "housing case gehaeuse gear getriebe ambient",
     "winding": "winding wicklung coil stator",
-    "d": "d id",
+    "d": "d",
 }
 _MEANING: dict[str, str] = {word: meaning for meaning, words in WORDS.items() for word in words.split()}
 QUANTITIES = ("time", "angle", "velocity", "acceleration", "torque", "current", "temperature")
+#: Letters beyond ASCII, as the words above spell them.
+_LETTERS = {
+    "ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "φ": " phi ", "ϕ": " phi ",
+    "θ": " theta ", "ϑ": " theta ", "ω": " omega ", "τ": " tau ",
+}  # fmt: skip
 #: Joints between the parts of a German compound.
 _LINKS = ("", "s", "es", "n", "en")
 
@@ -73,7 +81,7 @@ class Meaning:
 
 
 def meaning(name: str, stated: str = "") -> Meaning:
-    """What a column's name says; ``stated`` is the unit that stands elsewhere (a row of units, an attribute)."""
+    """What a column's name says; ``stated`` is the unit that stands elsewhere, as in a row of units."""
     bare, in_name = split_name(name)
     unit = stated or in_name
     numbered = re.fullmatch(r"(.*?)[ _.\-\[]*(\d{1,2})\]?", bare)
@@ -86,7 +94,7 @@ def meaning(name: str, stated: str = "") -> Meaning:
     named = [each for each in found if each in QUANTITIES]
     if of_unit and (not named or of_unit[0] not in named):
         # A one-letter unit at the end of a name is one only where it fits.
-        if named and unit == in_name and len(unit) == 1:
+        if named and unit and unit == in_name and len(unit) == 1:
             unit = ""
         elif not named or of_unit[0] == "acceleration":
             named = [of_unit[0]]
@@ -101,9 +109,9 @@ def meaning(name: str, stated: str = "") -> Meaning:
 
 
 def _tokens(name: str) -> list[str]:
-    plain = name.translate(str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}))
-    for letter, word in (("φ", "phi"), ("ϕ", "phi"), ("θ", "theta"), ("ω", "omega"), ("τ", "tau"), ("ϑ", "theta")):
-        plain = plain.replace(letter, f" {word} ")
+    plain = name
+    for letter, word in _LETTERS.items():
+        plain = plain.replace(letter, word)
     split = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
     return [token.lower() for token in re.findall(r"[A-Za-z]+", split)]
 

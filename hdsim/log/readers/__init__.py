@@ -1,6 +1,6 @@
 """Readers of other people's files: one module a format, and one line here.
 
-A module of a table has ``open_table(path, mapping)``, which returns a `contract.Table`; one of messages has
+A module of a table has ``open_table(path, form)``, which returns a `contract.Table`; one of messages has
 ``messages(path, topics)``, which yields `contract.Message`.
 """
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from hdsim.errors import InputError
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ FORMATS = {
 }
 
 
-def format_of(path: Path, mapping: Mapping | None = None) -> Format:
+def format_of(path: Path, form: Form | None = None) -> Format:
     """Format of a file, from the mapping or the ending of its name; a folder is a ROS 2 bag.
 
     Raises:
@@ -62,8 +62,8 @@ def format_of(path: Path, mapping: Mapping | None = None) -> Format:
     """
     if not path.exists():
         raise InputError(f"{path}: no such file")
-    if mapping is not None and mapping.format is not None:
-        return FORMATS[mapping.format]
+    if form is not None and form.format is not None:
+        return FORMATS[form.format]
     if path.is_dir():
         return FORMATS["ros2"]
     ending = path.suffix.lower()

@@ -1,4 +1,4 @@
-"""Cells of text tables: which are numbers, and where in a sheet of them the names, units and numbers stand."""
+"""Cells of text tables: which are numbers, and where names, units and numbers stand."""
 
 from __future__ import annotations
 
@@ -99,7 +99,8 @@ def kind(cell: Any) -> str:
 def decimal_mark(cells: Sequence[str], comma_separates: bool) -> str | None:
     """The decimal mark of number cells; None where 1,234 may be either.
 
-    A comma is one where a cell has a comma that cannot group thousands, or groups with points; else it is a point.
+    A comma is one where a cell has a comma that cannot group thousands, or groups with points; else it is a
+    point.
     """
     commas = [cell.strip() for cell in cells if "," in cell and kind(cell) == "n"]
     if not commas:
@@ -192,7 +193,9 @@ def _text(cell: Any) -> str:
 def _fits(row: Sequence[Any], width: int) -> bool:
     """A row that can name ``width`` columns: it may lack or have an empty last cell."""
     filled = len(row) - sum(1 for cell in row[width:] if not _text(cell))
-    return filled in (width, width - 1) and any(kind(cell) == "t" for cell in row) and (width > 1 or filled)
+    return (
+        filled in (width, width - 1) and any(kind(cell) == "t" for cell in row) and (width > 1 or filled > 0)
+    )
 
 
 def _are_units(row: Sequence[Any]) -> bool:

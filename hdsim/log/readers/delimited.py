@@ -1,4 +1,4 @@
-"""Text tables (CSV and its many kin): encoding, separator, decimal mark, names and units found, read in chunks."""
+"""Text tables (CSV and its kin): encoding, separator, decimal mark, names and units found; read in chunks."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -19,7 +20,7 @@ from hdsim.log.readers.cells import MISSING, Layout, date, decimal_mark, kind, l
 from hdsim.log.readers.contract import Numbers, Table, Tell, silent
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 #: Lines from which the form of a file is found, and lines that are read at a time.
 LOOKED_AT = 400
@@ -36,15 +37,14 @@ _MARKS = {
 }
 
 
-def open_table(path: Path, mapping: Mapping | None = None) -> Table:
+def open_table(path: Path, form: Form | None = None) -> Table:
     """Look at the beginning of a text table.
 
     Raises:
         InputError: the file is none, or its decimal mark cannot be told.
     """
-    given = mapping
-    encoding = (given.encoding if given else None) or _encoding(path)
-    skipped = given.skip_lines if given else 0
+    encoding = (form.encoding if form else None) or _encoding(path)
+    skipped = form.skip_lines if form else 0
     try:
         with open(path, newline="", encoding=encoding) as file:
             lines = list(islice(file, skipped + LOOKED_AT))[skipped:]
@@ -55,7 +55,7 @@ def open_table(path: Path, mapping: Mapping | None = None) -> Table:
     if not lines:
         raise InputError(f"{path}: it is empty")
     try:
-        separator = (given.separator if given else None) or _separator(lines)
+        separator = (form.separator if form else None) or _separator(lines)
         rows = list(_rows(iter(lines), separator))
         bare = [row for line in comments for row in _rows(iter([line.strip().lstrip("#%/! ")]), separator)]
     except csv.Error as error:
@@ -64,7 +64,7 @@ def open_table(path: Path, mapping: Mapping | None = None) -> Table:
     if found is None:
         raise InputError(f"{path}: it is empty")
     cells = [cell for row in rows[found.first :] for cell in row]
-    decimal = (given.decimal if given else None) or decimal_mark(cells, separator == ",")
+    decimal = (form.decimal if form else None) or decimal_mark(cells, separator == ",")
     if decimal is None:
         example = next(cell for cell in cells if "," in cell)
         raise InputError(
@@ -96,11 +96,11 @@ class _Delimited(Table):
         columns = [_Growing(self, place) for place in places]
         size = max(self.path.stat().st_size, 1)
         try:
-            with open(self.path, newline="", encoding=self.encoding) as file:
+            with open(self.path, "rb") as raw, TextIOWrapper(raw, self.encoding, newline="") as file:
                 for _ in range(self.skipped):
                     next(file, None)
                 table = _Numbered(file, self.skipped)
-                body = islice(_rows(iter(table), self.separator, table), self.first, None)
+                body = islice(_rows(iter(table), self.separator), self.first, None)
                 left = rows
                 while left is None or left > 0:
                     chunk = list(islice(body, CHUNK if left is None else min(CHUNK, left)))
@@ -109,7 +109,7 @@ class _Delimited(Table):
                     left = None if left is None else left - len(chunk)
                     for column in columns:
                         column.extend(chunk, table.line)
-                    tell(min(file.buffer.tell() / size, 1.0))
+                    tell(min(raw.tell() / size, 1.0))
         except (OSError, UnicodeError, csv.Error) as error:
             raise InputError(f"{self.path}: cannot be read as CSV: {error}") from None
         return [column.whole() for column in columns]
@@ -120,7 +120,7 @@ class _Delimited(Table):
             for _ in range(self.skipped):
                 next(file, None)
             table = _Numbered(file, self.skipped)
-            next(islice(_rows(iter(table), self.separator, table), self.first + row, None), None)
+            next(islice(_rows(iter(table), self.separator), self.first + row, None), None)
             return table.line
 
 
@@ -204,7 +204,7 @@ def _is_comment(line: str) -> bool:
     return line.lstrip(' \t\ufeff"').startswith(_COMMENT)
 
 
-def _rows(lines: Iterator[str], separator: str, _: object = None) -> Iterator[list[str]]:
+def _rows(lines: Iterator[str], separator: str) -> Iterator[list[str]]:
     if separator == " ":
         lines = (" ".join(line.split()) for line in lines)
     for row in csv.reader(lines, delimiter=separator, skipinitialspace=True):
@@ -234,7 +234,7 @@ def _separator(lines: list[str]) -> str:
 
 
 def _encoding(path: Path) -> str:
-    """By the byte order mark; else UTF-16 where every second byte is 0, UTF-8 where all of it is, or Windows' own."""
+    """By the byte order mark; else UTF-16 where every second byte is 0, UTF-8 if it is, or Windows' own."""
     try:
         with open(path, "rb") as file:
             head = file.read(4096)

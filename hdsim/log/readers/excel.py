@@ -17,7 +17,7 @@ from hdsim.log.readers.cells import date, decimal_mark, kind, layout, number
 from hdsim.log.readers.contract import Numbers, Table, Tell, even, needed, silent
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 _LOOKED_AT = 200
 _TOLD_EVERY = 5000
@@ -31,7 +31,7 @@ class _Sheet:
     decimal: str
 
 
-def open_table(path: Path, mapping: Mapping | None = None) -> Table:
+def open_table(path: Path, form: Form | None = None) -> Table:
     """Open a workbook; see `Table`."""
     excel = needed("openpyxl", "openpyxl", "excel", "Excel workbooks")
     from zipfile import BadZipFile
@@ -50,7 +50,7 @@ def open_table(path: Path, mapping: Mapping | None = None) -> Table:
         if found is None or found.first >= len(rows):
             continue  # a sheet of words
         texts = [cell for row in rows[found.first :] for cell in row if isinstance(cell, str)]
-        decimal = (mapping.decimal if mapping else None) or decimal_mark(texts, False) or "."
+        decimal = (form.decimal if form else None) or decimal_mark(texts, False) or "."
         prefix = f"{sheet.title}!" if sheets else ""
         units |= {len(names) + k: unit for k, unit in found.units.items()}
         words += [len(names) + k for k in found.words]
@@ -63,7 +63,13 @@ def open_table(path: Path, mapping: Mapping | None = None) -> Table:
 
 class _Excel(Table):
     def __init__(
-        self, path: Path, names: Sequence[str], units: dict[int, str], words: list[int], book: Any, sheets: list[_Sheet]
+        self,
+        path: Path,
+        names: Sequence[str],
+        units: dict[int, str],
+        words: list[int],
+        book: Any,
+        sheets: list[_Sheet],
     ) -> None:
         notes = [f"sheet {', '.join(sheet.title for sheet in sheets)}"]
         super().__init__(path, names, units, notes, words)

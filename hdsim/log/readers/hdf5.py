@@ -1,4 +1,4 @@
-"""HDF5 files (and MATLAB's since 7.3, which are such), by h5py; only the columns that are asked for are read."""
+"""HDF5 files (and MATLAB's since 7.3, which are such), by h5py; only the columns asked for are read."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from hdsim.errors import InputError
 from hdsim.log.readers.contract import Numbers, Table, Tell, even, needed, numeric, silent
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 #: Most columns of a matrix that are offered one by one; a wider one is no table of channels.
 MOST_COLUMNS = 64
 _READABLE = "biuf"
 
 
-def open_table(path: Path, mapping: Mapping | None = None) -> Table:
+def open_table(path: Path, form: Form | None = None) -> Table:
     """Open an HDF5 file; a column is ``group/dataset``, ``matrix[2]`` (from 0) or ``table/field``."""
     return open_hdf5(path, "/", "HDF5")
 

@@ -13,12 +13,12 @@ from hdsim.log.readers.contract import Numbers, Table, Tell, even, numeric, sile
 from hdsim.log.readers.hdf5 import MOST_COLUMNS, open_hdf5
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 _HDF5_BEGINS = b"\x89HDF\r\n\x1a\n"
 
 
-def open_table(path: Path, mapping: Mapping | None = None) -> Table:
+def open_table(path: Path, form: Form | None = None) -> Table:
     """Open a MATLAB file; a column is a variable, ``structure.field`` or ``matrix[2]`` (from 0)."""
     try:
         with open(path, "rb") as file:

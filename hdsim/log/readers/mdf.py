@@ -13,16 +13,17 @@ from hdsim.errors import InputError
 from hdsim.log.readers.contract import Numbers, Table, Tell, needed, numeric, silent
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 #: The column of the recorder's time, in s.
 TIME = "time"
 
 
-def open_table(path: Path, mapping: Mapping | None = None) -> Table:
+def open_table(path: Path, form: Form | None = None) -> Table:
     """Open an MDF file; a column is ``channel``, or ``group/channel`` (from 0) where two groups have it.
 
-    ``time`` is the master of the first channel that is asked for; channels of other rates are interpolated to it.
+    ``time`` is the master of the first channel that is asked for; channels of other rates are interpolated
+    to it.
     """
     asammdf = needed("asammdf", "asammdf", "mdf", "MDF")
     try:
@@ -79,4 +80,4 @@ class _Mdf(Table):
             found[place] = values
             tell((k + 1) / max(len(asked), 1))
         assert lead is not None
-        return [found[place] if place in found else lead for place in places]
+        return [found.get(place, lead) for place in places]

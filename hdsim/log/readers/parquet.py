@@ -12,10 +12,10 @@ from hdsim.errors import InputError
 from hdsim.log.readers.contract import Numbers, Table, Tell, needed, numeric, silent
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 
-def open_table(path: Path, mapping: Mapping | None = None) -> Table:
+def open_table(path: Path, form: Form | None = None) -> Table:
     """Open a Parquet file; see `Table`."""
     pq = needed("pyarrow", "pyarrow.parquet", "parquet", "Parquet")
     try:

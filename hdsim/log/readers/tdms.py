@@ -13,13 +13,13 @@ from hdsim.errors import InputError
 from hdsim.log.readers.contract import Numbers, Table, Tell, even, needed, numeric, silent
 
 if TYPE_CHECKING:
-    from hdsim.log.mapping import Mapping
+    from hdsim.log.mapping import Form
 
 #: The column of a waveform's own time, in s.
 TIME = "time"
 
 
-def open_table(path: Path, mapping: Mapping | None = None) -> Table:
+def open_table(path: Path, form: Form | None = None) -> Table:
     """Open a TDMS file; a column is ``channel``, or ``group/channel`` where two groups have it."""
     tdms = needed("npTDMS", "nptdms", "tdms", "TDMS")
     try:
