@@ -72,13 +72,13 @@ def _checked(file: str) -> tuple[str, list[str]]:
     return scenario.summary(), list(doubts(scenario))
 
 
-def _described(of: str) -> type[BaseModel]:
+def described(of: str) -> type[BaseModel]:
     """The class of a kind of file."""
     from importlib import import_module
 
     module, _, name = KINDS[of].partition(":")
-    described: type[BaseModel] = getattr(import_module(module), name)
-    return described
+    found: type[BaseModel] = getattr(import_module(module), name)
+    return found
 
 
 @click.command(short_help="Print the JSON schema of scenarios or other files, for editors.")
@@ -96,7 +96,7 @@ def schema(of: str, output: Path | None) -> None:
     from hdsim.errors import InputError
     from hdsim.scenario.schema import json_schema
 
-    text = json.dumps(json_schema(_described(of)), indent=1)
+    text = json.dumps(json_schema(described(of)), indent=1)
     if output is None:
         click.echo(text)
         return

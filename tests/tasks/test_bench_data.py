@@ -340,3 +340,41 @@ def test_a_reader_that_is_absent_is_named_with_its_extra(
         assert command("mapping", file) == 2
         assert f"needs the package {package}: pip install 'hdsim[{extra}]'" in capsys.readouterr().err
     assert not Path("mapping.yaml").exists()
+
+
+def test_what_is_open_is_asked_on_a_terminal_and_listed_elsewhere(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("a.csv").write_text(text(["time_s", "position_deg"], [row[:3:2] for row in cells()], ","))
+    assert command("mapping", "a.csv") == 1
+    assert "--set 'position_deg.channel=output_angle'" in capsys.readouterr().err
+    assert command("check", "mapping.yaml") == 2  # nothing is mapped yet
+    assert "no channel is mapped" in capsys.readouterr().err
+    assert command("mapping", "a.csv") == 2
+    assert "there is a file already" in capsys.readouterr().err
+    for stream in ("stdin", "stderr"):
+        monkeypatch.setattr(f"sys.{stream}.isatty", lambda: True)
+    asked = []
+    monkeypatch.setattr("click.prompt", lambda words, **options: asked.append(words) or options["default"])
+    assert command("mapping", "a.csv", "--force") == 0
+    assert asked == ["whether position_deg is output_angle or motor_angle (- leaves it open)"]
+    assert command("check", "mapping.yaml") == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--set", "nonsense"], "expected KEY=VALUE"),
+        (["--set", "ratio=x"], "expected a number"),
+        (["--set", "speed.unit=rpm"], "no column 'speed'"),
+        (["--set", "time.colour=blue"], "expected ratio, time.KEY"),
+        (["--set", "output_angle [deg].channel=angle"], "expected motor_angle"),
+        (["-o", "nowhere/m.yaml"], "no such folder"),
+    ],
+)
+def test_what_is_said_wrongly_is_refused_and_nothing_written(
+    options: list[str], complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command("mapping", plain(), *options) == 2
+    assert complaint in capsys.readouterr().err
+    assert [path.name for path in Path().iterdir()] == ["a.csv"]

@@ -20,7 +20,7 @@ _PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|infinity
 #: Marks between groups of three digits that can be nothing else: apostrophes, and spaces of any kind.
 _GROUPS = "'\u2019 \u00a0\u2009\u202f"
 _GROUPED = {
-    mark: re.compile(rf"[+-]?\d{{1,3}}([{_GROUPS}{other}])\d{{3}}(\1\d{{3}})*({re.escape(mark)}\d*)?")
+    mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}([{_GROUPS}{other}])\d{{3}}(\1\d{{3}})*({re.escape(mark)}\d*)?")
     for mark, other in ((".", ","), (",", "."))
 }
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d)(?:[T ](\d\d:\d\d(?::\d\d)?)(?:[.,](\d{1,9}))?(Z|[+-]\d\d:?\d\d)?)?")
@@ -96,7 +96,7 @@ def kind(cell: Any) -> str:
     return "d"
 
 
-def decimal_mark(cells: Sequence[str], comma_separates: bool) -> str | None:
+def decimal_mark(cells: Sequence[str]) -> str | None:
     """The decimal mark of number cells; None where 1,234 may be either.
 
     A comma is one where a cell has a comma that cannot group thousands, or groups with points; else it is a

@@ -64,7 +64,7 @@ def open_table(path: Path, form: Form | None = None) -> Table:
     if found is None:
         raise InputError(f"{path}: it is empty")
     cells = [cell for row in rows[found.first :] for cell in row]
-    decimal = (form.decimal if form else None) or decimal_mark(cells, separator == ",")
+    decimal = (form.decimal if form else None) or decimal_mark(cells)
     if decimal is None:
         example = next(cell for cell in cells if "," in cell)
         raise InputError(

@@ -50,7 +50,7 @@ def open_table(path: Path, form: Form | None = None) -> Table:
         if found is None or found.first >= len(rows):
             continue  # a sheet of words
         texts = [cell for row in rows[found.first :] for cell in row if isinstance(cell, str)]
-        decimal = (form.decimal if form else None) or decimal_mark(texts, False) or "."
+        decimal = (form.decimal if form else None) or decimal_mark(texts) or "."
         prefix = f"{sheet.title}!" if sheets else ""
         units |= {len(names) + k: unit for k, unit in found.units.items()}
         words += [len(names) + k for k in found.words]
