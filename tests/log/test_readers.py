@@ -1,9 +1,8 @@
-"""Readers of foreign files: what is in a cell, where the numbers of a table begin, and files that are damaged."""
+"""Readers of foreign files: what is in a cell, where the numbers of a table begin, damaged files."""
 
 from __future__ import annotations
 
 import datetime
-from pathlib import Path
 
 import numpy as np
 import pytest

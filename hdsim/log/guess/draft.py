@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from hdsim.log.guess.relations import moves
 from hdsim.log.guess.survey import Survey, survey
 from hdsim.log.guess.timing import find_time
 from hdsim.log.guess.torque import map_torques
-from hdsim.log.mapping import Channels, Form
+from hdsim.log.mapping import TIME_UNITS, Channels, Form
 from hdsim.log.readers.contract import Tell, missing, silent
 
 #: An axis moves where its travel is at least this share of the farthest one's.
@@ -86,12 +87,17 @@ def _take(columns: list[Candidate], said: dict[str, str], path: Path) -> tuple[d
     for key, value in said.items():
         place, _, name = key.rpartition(".")
         if key == "ratio":
-            try:
-                ratio = float(value)
-            except ValueError:
-                raise InputError(f"--set ratio: found {value!r}, expected a number") from None
+            ratio = _number(key, value)
+            if abs(ratio) < 1:
+                raise InputError(
+                    f"--set ratio: found {value}, expected motor angle / output angle, at least 1"
+                )
         elif place == "time" and name in _OF_TIME:
             of_time[name] = value
+            if name == "rate_hz" and _number(key, value) <= 0:
+                raise InputError(f"--set {key}: found {value}, expected a rate in Hz")
+            if name == "unit" and value not in TIME_UNITS:
+                raise InputError(f"--set {key}: found {value!r}, expected {', '.join(TIME_UNITS)}")
         elif name in _OF_COLUMN:
             column = next((c for c in columns if place in (c.label, str(c.origin.column))), None)
             if column is None:
@@ -100,6 +106,10 @@ def _take(columns: list[Candidate], said: dict[str, str], path: Path) -> tuple[d
                 raise InputError(
                     f"--set {key}: found {value!r}, expected {', '.join(Channels.model_fields)} or none"
                 )
+            if name == "side" and value not in ("motor", "output"):
+                raise InputError(f"--set {key}: found {value!r}, expected motor or output")
+            if name in ("counts_per_turn", "torque_constant_nm_per_a") and _number(key, value) <= 0:
+                raise InputError(f"--set {key}: found {value}, expected a positive number")
             column.said[name] = value
         else:
             raise InputError(
@@ -107,6 +117,16 @@ def _take(columns: list[Candidate], said: dict[str, str], path: Path) -> tuple[d
                 f"COLUMN.KEY ({', '.join(_OF_COLUMN)})"
             )
     return of_time, ratio
+
+
+def _number(key: str, text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise InputError(f"--set {key}: found {text!r}, expected a number")
+    return found
 
 
 def _axis(seen: Survey, axis: int | None, found: Draft, path: Path) -> tuple[list[Candidate], bool]:
@@ -118,6 +138,8 @@ def _axis(seen: Survey, axis: int | None, found: Draft, path: Path) -> tuple[lis
     several = [each for each in stems.values() if len(each) > 1]
     numbers = sorted({number for each in several for number in each})
     if len(several) < 2 or len(numbers) < 2:
+        if axis is not None:
+            raise InputError(f"--axis: found {axis}, but {path} holds one axis, as its columns are named")
         return seen.columns, False
     if axis is None:
         travel: dict[int, float] = dict.fromkeys(numbers, 0.0)
@@ -167,6 +189,9 @@ def _temperature(measured: list[Candidate], found: Draft) -> None:
         key=lambda c: ("channel" not in c.said, c.meaning.side == "motor", "housing" not in c.meaning.marks)
     )
     for column in columns:
+        if not np.isfinite(column.values).any():
+            found.unused[column.label] = "it holds no number"
+            continue
         wound = column.meaning.side == "motor" or "winding" in column.meaning.marks
         if "temperature" in found.channels or (wound and "channel" not in column.said):
             found.unused[column.label] = (

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hdsim.errors import InputError
 from hdsim.log.guess.findings import Candidate
 from hdsim.log.guess.relations import Array, step_of, turn_of
-from hdsim.log.mapping import ANGLE_UNITS, VELOCITY_UNITS
+from hdsim.log.mapping import ANGLE_UNITS, CURRENT_UNITS, TORQUE_UNITS, VELOCITY_UNITS
 from hdsim.log.units import unit_of
 
 #: Usual travel in rad and usual top speed in rad/s of either side; each decade above costs 1, below a half:
@@ -31,6 +32,14 @@ TURNS = (*(2.0**n for n in range(8, 33)), 360.0, 500.0, 1000.0, 2000.0, 2500.0, 
 CONTRADICTED = 7.0
 UNFIT = 9.0
 _STEP_SHOWS = 6.0
+#: Units of each quantity, as a mapping calls them.
+UNITS = {
+    "angle": (*ANGLE_UNITS, "count"),
+    "velocity": (*VELOCITY_UNITS,),
+    "torque": (*TORQUE_UNITS, *CURRENT_UNITS),
+    "current": (*CURRENT_UNITS,),
+    "temperature": ("degC", "K", "degF"),
+}
 _FAMILY = {
     "rad": "rad",
     "deg": "deg",
@@ -69,9 +78,20 @@ class Reading:
 
 
 def stated_unit(column: Candidate) -> str:
-    """The unit that the user or the file says, as the mapping calls it, or ""."""
+    """The unit that the user or the file says, as the mapping calls it, or "".
+
+    Raises:
+        InputError: the user says one that is none of the column's quantity.
+    """
     if "unit" in column.said:
-        return column.said["unit"]
+        said = column.said["unit"]
+        allowed = UNITS.get(column.quantity, ())
+        if said not in allowed:
+            raise InputError(
+                f"--set {column.label}.unit: found {said!r}, expected {', '.join(allowed) or 'no unit'} "
+                f"(its quantity is {column.quantity or 'not known: say its channel'})"
+            )
+        return said
     known = unit_of(column.meaning.unit)
     fits = known is not None and known[0] in (
         column.quantity,

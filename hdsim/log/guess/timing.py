@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
+from hdsim.errors import InputError
 from hdsim.log.clock import spread
 from hdsim.log.guess.findings import Answer, Candidate, Draft, Ground
 from hdsim.log.guess.relations import Array
 from hdsim.log.guess.survey import Survey
 from hdsim.log.mapping import TIME_UNITS
+from hdsim.log.readers.contract import missing
 from hdsim.log.units import unit_of
 
 #: Usual rates of recordings, Hz; each decade beyond costs 1. So does a unit that a fractional number seldom
@@ -88,7 +90,12 @@ def _words(column: Candidate, said: dict[str, str]) -> str:
 
 def _column(columns: list[Candidate], said: str | None) -> Candidate | None:
     if said is not None:
-        return next((c for c in columns if said in (c.label, str(c.origin.column))), None)
+        found = next((c for c in columns if said in (c.label, str(c.origin.column))), None)
+        if found is None:
+            raise missing("--set time.column", "column", said, [c.label for c in columns])
+        if not _counts(found):
+            raise InputError(f"--set time.column: the numbers of {said!r} do not count time: they fall")
+        return found
     dated = [c for c in columns if c.values.dtype.kind == "M"]
     named = [c for c in columns if c.quantity == "time" and c.meaning.measured and _counts(c)]
     for found in (*named, *dated):
