@@ -161,6 +161,30 @@ def test_a_speed_that_counts_the_other_way_gets_a_sign(tmp_path):
     assert found.channels["output_velocity"].keys["sign"].value == -1
 
 
+def test_torques_that_run_against_each_other_are_asked_about(tmp_path):
+    torque = 12 * np.cos(5 * TIME)
+    columns = {"t_s": TIME, "motor_angle_rad": -80 * ANGLE, "output_angle_rad": ANGLE,
+               "motor_torque_Nm": torque / 90, "output_torque_Nm": torque}  # fmt: skip
+    found = drafted(tmp_path, columns)
+    assert found.ratio is not None
+    assert found.ratio.value == -80
+    assert [question.key for question in found.open] == ["output_torque_Nm.sign"]
+    told = drafted(tmp_path, columns, output_torque_Nm__sign="-1")
+    assert told.open == []
+    assert loaded(tmp_path, told).channels.output_torque.sign == -1
+    columns["motor_torque_Nm"] *= -1
+    assert drafted(tmp_path, columns).open == []
+
+
+def test_a_date_beside_the_time_of_day_and_a_gap(tmp_path):
+    clock = [f"12:00:{k * 0.01 + (2 if k > 50 else 0):06.3f}" for k in range(100)]
+    lines = [f"2024-07-11;{at};{k * k}" for k, at in enumerate(clock)]
+    (tmp_path / "a.csv").write_text("\n".join(["Datum;Uhrzeit;Abtriebswinkel [°]", *lines]))
+    found = draft(tmp_path / "a.csv")
+    assert (found.time["column"].value, found.time["unit"].value) == ("Uhrzeit", "iso")
+    assert loaded(tmp_path, found).longest_gap_s == 0.05
+
+
 def test_what_nothing_tells_is_asked_and_the_rest_can_be_used(tmp_path):
     columns = {"t_s": TIME, "motor_angle_rad": 80 * ANGLE, "motor_current_A": np.cos(5 * TIME)}
     found = drafted(tmp_path, columns)
@@ -222,4 +246,5 @@ def test_cycloidal_actuator_whose_side_its_file_does_not_tell(tmp_path):
     stored = load_model(
         Path(__file__).parents[2] / "scenarios" / "mappings" / "cycloidal_torque_ramp.yaml", Mapping
     )
-    assert mapping.model_copy(update={"description": ""}) == stored.model_copy(update={"description": ""})
+    own = {"description": "", "longest_gap_s": None}
+    assert mapping.model_copy(update=own) == stored.model_copy(update=own)

@@ -8,6 +8,8 @@ from hdsim.log.guess.findings import Draft
 #: the ends of the segments. Harmonic Drive LLC, CSF/CSG catalogue.
 _STIFFNESS = (400.0, 625.0, 725.0)
 _ENDS = (0.175, 0.625)
+#: Damping of that spring over its stiffness, s: an estimate.
+_DAMPING = 6e-4
 #: Input inertias of that drive, kg m^2 per (N m)^(5/3): mass goes with the cube of the size, as torque does.
 _INERTIA = (3e-5 / 40 ** (5 / 3), 1e-5 / 40 ** (5 / 3))
 
@@ -31,7 +33,11 @@ def base_scenario(draft: Draft) -> str | None:
     k1, k2, k3 = (f"{_rounded(k * rated):g}" for k in _STIFFNESS)
     t1, t2 = (f"{_rounded(t * rated):g}" for t in _ENDS)
     motor, generator = (f"{_rounded(i * rated ** (5 / 3)):.2e}" for i in _INERTIA)
-    return f"""# The plainest model for {draft.title}, by hdsim mapping: ratio and inertia, nothing else.
+    both = {"motor_angle", "output_angle"} <= set(draft.channels)
+    # With both angles the twist between them is seen, and needs a spring.
+    mesh = "  mesh: {model: lumped}" if both else "  mesh: {model: rigid}"
+    damping = f"{_rounded(_DAMPING * _STIFFNESS[1] * rated):g}"
+    return f"""# The plainest model for {draft.title}, by hdsim mapping: no friction, no play.
 # Only the ratio is the recording's. The other numbers are those of a CSG drive of this rated torque, scaled:
 # put your drive's own here, or a preset (hdsim presets).
 name: base for {_plain(draft.title)}
@@ -45,8 +51,9 @@ drive:
     stiffness_k3_nm_per_rad: {k3}
     torque_t1_nm: {t1}
     torque_t2_nm: {t2}
+    damping_nm_s_per_rad: {damping}
   inertia: {{motor_kg_m2: {motor}, wave_generator_kg_m2: {generator}}}
-  mesh: {{model: rigid}}
+{mesh}
 command:
   motor: {{type: free}}
 load: {{inertia_kg_m2: 1.0e-4}}

@@ -21,7 +21,9 @@ from hdsim.log.readers.contract import Tell, missing, silent
 
 #: An axis moves where its travel is at least this share of the farthest one's.
 _MOVES = 0.05
-_OF_COLUMN = ("channel", "unit", "side", "counts_per_turn", "torque_constant_nm_per_a")
+#: Samples that are missing where a gap is worth a note.
+_GAP = 5
+_OF_COLUMN = ("channel", "unit", "side", "sign", "counts_per_turn", "torque_constant_nm_per_a")
 _OF_TIME = ("column", "unit", "rate_hz")
 
 
@@ -37,7 +39,7 @@ def draft(
     Args:
         path: the recording.
         said: what the user knows: ``ratio``, ``time.unit``, ``time.rate_hz``, ``time.column``, and
-            ``<column>.<key>`` with channel, unit, side, counts_per_turn or torque_constant_nm_per_a.
+            ``<column>.<key>`` with channel, unit, side, sign, counts_per_turn or torque_constant_nm_per_a.
         axis: number of the axis, of a file with several.
         form: how the file is to be read, as far as the user says.
         tell: hears how far the reading is.
@@ -69,8 +71,11 @@ def draft(
     number = map_motion(measured, travels, time, times, ratio, torque, many, found)
     map_torques([c for c in measured if c.quantity in ("torque", "current")], number, found)
     _temperature(measured, found)
+    for channel in found.channels.values():
+        if "sign" in channel.source.said:
+            channel.keys["sign"] = Answer(int(channel.source.said["sign"]), Ground.SAID)
     _ratio(found, number)
-    _sampling(time, found)
+    _gaps(time, found)
     _leave_out(found)
     return found
 
@@ -108,6 +113,8 @@ def _take(columns: list[Candidate], said: dict[str, str], path: Path) -> tuple[d
                 )
             if name == "side" and value not in ("motor", "output"):
                 raise InputError(f"--set {key}: found {value!r}, expected motor or output")
+            if name == "sign" and value not in ("1", "-1"):
+                raise InputError(f"--set {key}: found {value!r}, expected 1 or -1")
             if name in ("counts_per_turn", "torque_constant_nm_per_a") and _number(key, value) <= 0:
                 raise InputError(f"--set {key}: found {value}, expected a positive number")
             column.said[name] = value
@@ -229,12 +236,16 @@ def _ratio(found: Draft, ratio: float | None) -> None:
             found.channels[name].why += "; needs the ratio"
 
 
-def _sampling(time: np.ndarray, found: Draft) -> None:
+def _gaps(time: np.ndarray, found: Draft) -> None:
+    """Have gaps of more than a few samples noted by the import."""
     steps = np.diff(time)
-    if found.time.get("rate_hz") is None and len(steps) and float(np.median(steps)) > 0:
-        gaps = int((steps > 5 * float(np.median(steps))).sum())
-        if gaps:
-            found.notes.append(f"{gaps} gaps of more than five samples")
+    usual = float(np.median(steps))
+    unit = found.time.get("unit")
+    second = TIME_UNITS.get(str(unit.value), 1.0) if unit is not None else 1.0
+    many = int((steps > _GAP * usual).sum())
+    if many and usual > 0:
+        longest = float(f"{_GAP * usual * second:.3g}")
+        found.longest_gap_s = Answer(longest, Ground.SHOWN, f"{many} gaps of more than {_GAP} samples")
 
 
 def _leave_out(found: Draft) -> None:

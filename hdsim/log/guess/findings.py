@@ -119,6 +119,7 @@ class Draft:
         unused: columns that are not mapped, and why.
         open: what is left to be said.
         peak_output_nm: largest torque at the output that was seen, N m, for the base scenario.
+        longest_gap_s: of the mapping, where there are gaps.
     """
 
     title: str
@@ -129,6 +130,7 @@ class Draft:
     unused: dict[str, str] = field(default_factory=dict)
     open: list[Question] = field(default_factory=list)
     peak_output_nm: float | None = None
+    longest_gap_s: Answer | None = None
 
     def ask(self, text: str, key: str = "", example: str = "") -> None:
         """Leave something open."""

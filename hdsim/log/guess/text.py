@@ -40,6 +40,8 @@ def to_text(draft: Draft, form: Form | None = None) -> str:
         lines.append(f"{hidden}{name}:  # {mark and 'OPEN, '}{channel.ground}: {channel.why}")
         lines += [f"{hidden}  {_of(key, value)}" for key, value in _place(channel.source).items()]
         lines += [_line(key, answer, f"{hidden}  ") for key, answer in channel.keys.items()]
+    if draft.longest_gap_s is not None:
+        lines.append(_line("longest_gap_s", draft.longest_gap_s))
     lines += _unused(draft.unused)
     lines += [line for question in draft.open for line in _wrapped(f"OPEN: {question}")]
     return "\n".join(lines) + "\n"

@@ -96,7 +96,7 @@ def _column(columns: list[Candidate], said: str | None) -> Candidate | None:
         if not _counts(found):
             raise InputError(f"--set time.column: the numbers of {said!r} do not count time: they fall")
         return found
-    dated = [c for c in columns if c.values.dtype.kind == "M"]
+    dated = [c for c in columns if c.values.dtype.kind == "M" and _counts(c)]
     named = [c for c in columns if c.quantity == "time" and c.meaning.measured and _counts(c)]
     for found in (*named, *dated):
         return found
@@ -112,10 +112,10 @@ def _counts(column: Candidate) -> bool:
     """Whether the numbers hardly ever fall."""
     steps = np.diff(column.values)
     if steps.dtype.kind == "m":
-        return True
-    return bool(
-        np.all(np.isfinite(column.values)) and (steps > 0).any() and (steps < 0).mean() < _COUNTER_FALLS
-    )
+        steps = steps.astype(np.float64)  # a date beside the time of day stands still
+    elif not np.all(np.isfinite(column.values)):
+        return False
+    return bool((steps > 0).any() and (steps < 0).mean() < _COUNTER_FALLS)
 
 
 def _unwrapped(values: Array, draft: Draft) -> Array:

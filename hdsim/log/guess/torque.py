@@ -151,6 +151,7 @@ def _sides(currents: list[Candidate], ratio: float | None, draft: Draft) -> None
     side = _side(motor, currents, ratio, draft)
     if side is not None:
         motor.keys["side"] = side
+    _direction(motor, ratio, draft)
     at_output = []
     for name, channel in draft.channels.items():
         unit = channel.keys["unit"].value
@@ -163,6 +164,32 @@ def _sides(currents: list[Candidate], ratio: float | None, draft: Draft) -> None
         elif ratio is not None:
             at_output.append(largest * abs(ratio))
     draft.peak_output_nm = max(at_output, default=None)
+
+
+def _direction(motor: Channel, ratio: float | None, draft: Draft) -> None:
+    """Ask which one counts the other way, where the two torques do.
+
+    The power is the same on both sides: T_output = ratio T_motor, or the two are equal where both refer to the
+    output.
+    """
+    output = draft.channels.get("output_torque")
+    if output is None or {"sign"} & {*motor.source.said, *output.source.said}:
+        return
+    side = motor.keys.get("side")
+    at_output = side is not None and side.value == "output"
+    if not at_output and ratio is None:
+        return
+    found = slope(output.source.values, motor.source.values)
+    along = 1.0 if at_output or ratio is None else ratio
+    if found is not None and found.explained > _PROPORTIONAL and found.factor * along < 0:
+        why = f"it falls where {motor.source.label} rises"
+        output.keys["sign"] = Answer(None, Ground.OPEN, why)
+        draft.ask(
+            f"the sign of {output.source.label}: {why}, and the drive's torque on the output does not "
+            f"(or say the other's)",
+            f"{output.source.label}.sign",
+            "-1",
+        )
 
 
 def _side(motor: Channel, currents: list[Candidate], ratio: float | None, draft: Draft) -> Answer | None:
