@@ -65,8 +65,13 @@ def mapping(
     form = Form.model_validate({"decimal": decimal})
     with reading(data) as tell:
         found = draft(data, said, axis, form, tell)
-    while found.open and _asked(found, said):
-        found = draft(data, said, axis, form)
+    while answers := _asked(found, said):
+        try:
+            found = draft(data, said | answers, axis, form)
+        except InputError as error:
+            click.echo(f"error: {error}", err=True)
+        else:
+            said |= answers
     scenario = base_scenario(found)
     for path, text in ((output, to_text(found, form)), (base, scenario)):
         if text is None:
@@ -96,20 +101,19 @@ def _pair(setting: str) -> tuple[str, str]:
     return key.strip(), value.strip()
 
 
-def _asked(found: Draft, said: dict[str, str]) -> bool:
-    """Ask for what is open, on a terminal; whether anything new has been said."""
+def _asked(found: Draft, said: dict[str, str]) -> dict[str, str]:
+    """Ask for what is open, on a terminal; what has been answered, by key."""
     import sys
 
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        return False
-    new = False
-    for question in found.open:
-        if question.key and question.key not in said and "COLUMN" not in question.key:
-            answer = click.prompt(f"{question.text} (- leaves it open)", default=question.example, err=True)
-            if answer.strip() not in ("", "-"):
-                said[question.key] = answer.strip()
-                new = True
-    return new
+    answers = {}
+    if sys.stdin.isatty() and sys.stderr.isatty():
+        for question in found.open:
+            if question.key and question.key not in said and "COLUMN" not in question.key:
+                words = f"{question.text}; such as {question.example}, or - to leave it open"
+                answer = click.prompt(words, default="-", err=True).strip()
+                if answer != "-":
+                    answers[question.key] = answer
+    return answers
 
 
 def _show(found: Draft) -> None:

@@ -354,10 +354,12 @@ def test_what_is_open_is_asked_on_a_terminal_and_listed_elsewhere(
     assert "there is a file already" in capsys.readouterr().err
     for stream in ("stdin", "stderr"):
         monkeypatch.setattr(f"sys.{stream}.isatty", lambda: True)
-    asked = []
-    monkeypatch.setattr("click.prompt", lambda words, **options: asked.append(words) or options["default"])
+    answers, asked = ["up", "output_angle"], []
+    monkeypatch.setattr("click.prompt", lambda words, **options: asked.append(words) or answers.pop(0))
     assert command("mapping", "a.csv", "--force") == 0
-    assert asked == ["whether position_deg is output_angle or motor_angle (- leaves it open)"]
+    asks = "whether position_deg is output_angle or motor_angle; such as output_angle, or - to leave it open"
+    assert asked == 2 * [asks]
+    assert "found 'up', expected motor_angle" in capsys.readouterr().err
     assert command("check", "mapping.yaml") == 0
 
 

@@ -169,8 +169,7 @@ def _sides(currents: list[Candidate], ratio: float | None, draft: Draft) -> None
 def _direction(motor: Channel, ratio: float | None, draft: Draft) -> None:
     """Ask which one counts the other way, where the two torques do.
 
-    The power is the same on both sides: T_output = ratio T_motor, or the two are equal where both refer to the
-    output.
+    The power is the same on both sides: T_output = ratio T_motor, or both are equal where told at the output.
     """
     output = draft.channels.get("output_torque")
     if output is None or {"sign"} & {*motor.source.said, *output.source.said}:
