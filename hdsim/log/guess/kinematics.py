@@ -147,12 +147,15 @@ def _add(k: int, columns: list[Candidate], motion: Motion, turn: float | None, d
     costs = motion.costs[("reading", k)]
     fitted = k in motion.slopes or (k == motion.reference and len(motion.slopes) > 0)
     beside = ", ".join(columns[j].label for j in motion.slopes) if k == motion.reference else reference.label
-    keys: dict[str, Answer] = {"unit": _unit(column, best, costs, beside, fitted, draft)}
-    if best.unit == "count":
-        keys["counts_per_turn"] = _counts(column, best, costs)
     side, why, ground = _side(column, best, costs, motion)
     name = f"{physical_side(column) or side}_{column.quantity}"
-    if name in draft.channels:
+    taken = name in draft.channels
+    keys: dict[str, Answer] = {}
+    if not taken or best.contradicts:  # a contradiction is told even of a column that is not needed
+        keys["unit"] = _unit(column, best, costs, beside, fitted, draft)
+    if best.unit == "count":
+        keys["counts_per_turn"] = _counts(column, best, costs)
+    if taken:
         draft.unused[column.label] = f"{draft.channels[name].source.label} is {name} already, in finer steps"
         return
     if best.side != name.split("_")[0]:
@@ -172,7 +175,7 @@ def _add(k: int, columns: list[Candidate], motion: Motion, turn: float | None, d
     for key in ("unit", "counts_per_turn"):
         answer = keys.get(key)
         if answer is not None and answer.ground == Ground.OPEN and not best.contradicts:
-            usual = best.unit if key == "unit" else f"{best.counts:g}"
+            usual = best.unit if key == "unit" else f"{best.counts:.10g}"
             draft.ask(f"the {key} of {column.label}: {answer.why}", f"{column.label}.{key}", usual)
 
 

@@ -164,14 +164,9 @@ def layout(rows: Sequence[Sequence[Any]], comments: Sequence[Sequence[str]] = ()
     kinds = ["".join(kind(cell) for cell in row) for row in rows]
     later = [each for each in kinds[len(kinds) // 2 :] if len(each) == width] or kinds[-1:]
     most_text = max(each.count("t") for each in later)
-    first = next(
-        (
-            k
-            for k, each in enumerate(kinds)
-            if len(each) == width and each.count("t") <= most_text and ("n" in each or "d" in each)
-        ),
-        len(rows),
-    )
+    holding = [k for k, each in enumerate(kinds) if each.count("t") <= most_text and set(each) & {"n", "d"}]
+    # Where no row of numbers is whole, the first that is not will be complained of.
+    first = next((k for k in holding if len(kinds[k]) == width), min(holding, default=len(rows)))
     above = list(rows[:first])
     units: dict[int, str] = {}
     if len(above) >= 2 and _are_units(above[-1]) and _fits(above[-2], width):
@@ -182,7 +177,7 @@ def layout(rows: Sequence[Sequence[Any]], comments: Sequence[Sequence[str]] = ()
     else:
         head = next((line for line in reversed(comments) if _fits(line, width)), ())
     names = [_text(cell) for cell in head][:width]
-    words = tuple(k for k in range(width) if any(each[k] == "t" for each in later))
+    words = tuple(k for k in range(width) if any(each[k : k + 1] == "t" for each in later))
     return Layout(tuple(names + [""] * (width - len(names))), units, first, words)
 
 

@@ -63,6 +63,10 @@ def open_table(path: Path, form: Form | None = None) -> Table:
     found = layout(rows, bare)
     if found is None:
         raise InputError(f"{path}: it is empty")
+    if found.first == len(rows) > 1:
+        raise InputError(
+            f"{path}: cannot be read as CSV: no line holds numbers; the first is {lines[0].strip()[:40]!r}"
+        )
     cells = [cell for row in rows[found.first :] for cell in row]
     decimal = (form.decimal if form else None) or decimal_mark(cells)
     if decimal is None:
