@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import csv
-import re
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -49,7 +48,7 @@ def open_table(path: Path, form: Form | None = None) -> Table:
         with open(path, newline="", encoding=encoding) as file:
             lines = list(islice(file, skipped + LOOKED_AT))[skipped:]
     except (OSError, UnicodeError, LookupError) as error:
-        raise InputError(f"{path}: cannot be read as text: {error}") from None
+        raise InputError(f"{path}: cannot be read as CSV: {error}") from None
     comments = [line for line in lines if _is_comment(line)]
     lines = [line for line in lines if line.strip() and not _is_comment(line)]
     if not lines:
@@ -256,7 +255,7 @@ def _encoding(path: Path) -> str:
                     decoder.decode(block)
                 decoder.decode(b"", final=True)
             except UnicodeDecodeError:
-                return "cp1252" if not re.search(rb"[\x81\x8d\x8f\x90\x9d\x00]", head) else "latin-1"
+                return "cp1252"
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     return "utf-8"
