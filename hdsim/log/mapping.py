@@ -22,7 +22,15 @@ ANGLE_UNITS = {
     "rev": _TURN,
 }
 VELOCITY_UNITS = {"rad/s": 1.0, "deg/s": _TURN / 360, "rpm": _TURN / 60, "rev/s": _TURN}
-TORQUE_UNITS = {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2}
+_POUND_FORCE_N, _INCH_M = 4.4482216152605, 0.0254
+TORQUE_UNITS = {
+    "N m": 1.0,
+    "mN m": 1e-3,
+    "N cm": 1e-2,
+    "kN m": 1e3,
+    "lbf in": _POUND_FORCE_N * _INCH_M,
+    "lbf ft": _POUND_FORCE_N * 12 * _INCH_M,
+}
 CURRENT_UNITS = {"A": 1.0, "mA": 1e-3}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
@@ -110,7 +118,7 @@ class VelocityChannel(_Sided):
 class TorqueChannel(_Sided):
     """A torque, or the motor current that makes it."""
 
-    unit: Literal["N m", "mN m", "N cm", "A", "mA"]
+    unit: Literal["N m", "mN m", "N cm", "kN m", "lbf in", "lbf ft", "A", "mA"]
     """Unit of the recorded numbers."""
     torque_constant_nm_per_a: float | None = Field(None, gt=0)
     """Torque of one ampere, on the side to which the numbers refer. Unit N m/A."""
