@@ -23,14 +23,8 @@ ANGLE_UNITS = {
 }
 VELOCITY_UNITS = {"rad/s": 1.0, "deg/s": _TURN / 360, "rpm": _TURN / 60, "rev/s": _TURN}
 _POUND_FORCE_N, _INCH_M = 4.4482216152605, 0.0254
-TORQUE_UNITS = {
-    "N m": 1.0,
-    "mN m": 1e-3,
-    "N cm": 1e-2,
-    "kN m": 1e3,
-    "lbf in": _POUND_FORCE_N * _INCH_M,
-    "lbf ft": _POUND_FORCE_N * 12 * _INCH_M,
-}
+TORQUE_UNITS = {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2, "kN m": 1e3}
+TORQUE_UNITS |= {"lbf in": _POUND_FORCE_N * _INCH_M, "lbf ft": _POUND_FORCE_N * 12 * _INCH_M}
 CURRENT_UNITS = {"A": 1.0, "mA": 1e-3}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
