@@ -42,7 +42,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),
     "replay": ("hdsim.live.commands:replay", "Serve a finished log and its layouts to a viewer."),
     "info": ("hdsim.log.commands:info", "Show what is in a log."),
-    "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),
+    "export": ("hdsim.export.commands:export", "Write a log or a scenario for other programs."),
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
     "layout": ("hdsim.log.commands:layout", "Print a layout that shows a log in Foxglove."),
     "fit": ("hdsim.tell.fit_commands:fit", "Fit a scenario's numbers to measured records."),
