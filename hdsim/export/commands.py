@@ -57,6 +57,21 @@ def export(
 
         scenario = hdsim.load_scenario(source)
         click.echo(export_fmu(scenario, out, fmi=int(fmi), motor=motor, output=output))  # type: ignore[arg-type]
+    elif out.suffix == MUJOCO:
+        from rich.table import Table
+
+        import hdsim
+        from hdsim.console import console
+        from hdsim.export.mujoco import export_mujoco
+
+        lost = export_mujoco(hdsim.load_scenario(source), out)
+        table_of = Table("not as in the scenario", "in the file", "with hdsim.export.mujoco.Rest")
+        for one in lost:
+            table_of.add_row(
+                one.what, one.instead, "as in the scenario" if one.by_callback else "as in the file"
+            )
+        console().print(table_of)
+        click.echo(out)
     elif out.suffix in LOGS:
         from hdsim.log.export import export_log
 
