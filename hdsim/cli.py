@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from typing import Any
 
 import click
 
-from hdsim.errors import HdsimError
+from hdsim.errors import HdsimError, PluginWarning
 
 #: Where each command lives, and its line in ``hdsim --help``.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -121,6 +122,17 @@ def hdsim(context: click.Context, debug: bool) -> None:
         click.echo(context.get_help())
 
 
+def _show_warning(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+    """Say in a line what another package does wrong; everything else as Python does."""
+    if issubclass(category, PluginWarning):
+        click.echo(f"warning: {message}", err=True)
+    else:
+        _pythons_way(message, category, *where, **more)
+
+
+_pythons_way = warnings.showwarning
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 a check failed, 2 bad input, 130 interrupted.
 
@@ -133,6 +145,7 @@ def main(arguments: list[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     # Taken from the raw arguments, because the error may come before click has read them.
     debug = "--debug" in given
+    warnings.showwarning = _show_warning
     try:
         result: Any = hdsim.main(args=given, prog_name="hdsim", standalone_mode=False)
     except click.ClickException as error:

@@ -72,12 +72,16 @@ def effects() -> None:
     """List the physical effects that a scenario can turn on, with their sources and the orders they show."""
     from rich.table import Table
 
-    from hdsim.effects import catalogue
+    from hdsim.effects import catalogue, outside
 
-    table = Table("effect", "what it is", "source", "orders per wave-generator turn")
+    homes = {name: one.distribution for name, one in outside().items()}
+    table = Table(
+        "effect", "what it is", "source", "orders per wave-generator turn", *(["from"] if homes else [])
+    )
     for name, effect in catalogue().items():
         orders = ", ".join(f"{order:g}" for order in effect.signature.orders)
-        table.add_row(name, effect.title, effect.source, orders)
+        home = [homes.get(name, "hdsim")] if homes else []
+        table.add_row(name, effect.title, effect.source, orders, *home)
     terminal = console()
     terminal.print(table)
 
