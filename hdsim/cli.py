@@ -15,7 +15,7 @@ from hdsim.errors import HdsimError, PluginWarning
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("hdsim.simulation.commands:run", "Simulate a scenario, write its log, draw its figure."),
     "examples": ("hdsim.scenario.commands:examples", "List the scenarios that come with hdsim."),
-    "new": ("hdsim.scenario.commands:new", "Copy an example to start a scenario from."),
+    "new": ("hdsim.scenario.commands:new", "Copy an example, or begin an effect of your own."),
     "check": ("hdsim.scenario.commands:check", "Check scenarios and say what they describe."),
     "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios, for editors."),
     "effects": ("hdsim.scenario.commands:effects", "List the physical effects that a scenario can turn on."),

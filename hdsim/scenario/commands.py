@@ -100,21 +100,33 @@ def examples() -> None:
     console().print(table)
 
 
-@click.command(short_help="Copy an example to start a scenario from.")
-@click.argument("name", required=False)
-@click.argument("out", required=False, type=click.Path(path_type=Path))
+@click.command(short_help="Copy an example, or begin an effect of your own.")
+@click.argument("name", required=False, metavar="[EXAMPLE | effect]")
+@click.argument("out", required=False, metavar="[FILE | NAME]")
 @click.pass_context
-def new(context: click.Context, name: str | None, out: Path | None) -> None:
-    """Copy the example NAME to OUT [default: NAME.yaml], with what it extends and the schema for editors.
+def new(context: click.Context, name: str | None, out: str | None) -> None:
+    """Copy an EXAMPLE to FILE [default: EXAMPLE.yaml], with what it extends and the schema for editors.
 
-    Without NAME the examples are listed.
+    Without EXAMPLE they are listed. `hdsim new effect NAME` writes the folder hdsim-NAME: a package that adds
+    an effect to hdsim, with its test.
     """
+    from hdsim.errors import InputError
     from hdsim.scenario.examples import copy
 
     if name is None:
         context.invoke(examples)
         return
-    written = copy(name, out)
+    if name == "effect":
+        from hdsim.scenario.effect_template import new_effect
+
+        if out is None:
+            raise InputError("hdsim new effect: expected a name, such as: hdsim new effect brake_drag")
+        written = new_effect(out)
+        for path in written:
+            click.echo(f"wrote {path}")
+        click.echo(f"next: pip install -e {written[0].parent}; pytest {written[0].parent}; hdsim effects")
+        return
+    written = copy(name, None if out is None else Path(out))
     for path in written:
         click.echo(f"wrote {path}")
     click.echo(f"next: hdsim check {written[0]}; hdsim run {written[0]}")
