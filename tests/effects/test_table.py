@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
 import hdsim.kernel as k
-from hdsim.drive.model import Alone as DriveModel
+from hdsim.drive.model import Model
 from hdsim.drive.parameters import Drive
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
@@ -34,7 +34,7 @@ def table(coordinate: str, acts_on: str, at, values, **more) -> Table:
 def swing(effect: Effect | None, mesh: str = "lumped", seconds: float = 0.6) -> tuple[Run, object]:
     """A lossy drive with an arm's inertia, thrown by its initial speed and a step of load."""
     drive = Drive.model_validate({"preset": "seed-2021", "mesh": {"model": mesh}})
-    model = DriveModel(drive, [] if effect is None else [effect], load_inertia_kg_m2=0.3)
+    model = Model(drive, [] if effect is None else [effect], load_inertia_kg_m2=0.3)
     run = Run(
         model, duration_s=seconds, sample_rate_hz=500, rtol=1e-9, y0=model.initial_state(motor_velocity=80.0)
     )
