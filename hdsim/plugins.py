@@ -36,12 +36,20 @@ class Plugin:
 
 
 @cache
-def _loaded(group: str) -> tuple[Plugin, ...]:
-    """Everything of a group that can be imported."""
+def _entry_points() -> Any:
+    """Those of every installed package; they are read once, which takes some hundredths of a second."""
     from importlib.metadata import entry_points
 
+    return entry_points()
+
+
+@cache
+def _loaded(group: str) -> tuple[Plugin, ...]:
+    """Everything of a group that can be imported."""
     found = []
-    for entry in sorted(entry_points(group=f"hdsim.{group}"), key=lambda one: (one.name, _home(one))):
+    for entry in sorted(
+        _entry_points().select(group=f"hdsim.{group}"), key=lambda one: (one.name, _home(one))
+    ):
         try:
             value = entry.load()
         except Exception as error:  # whatever another package does wrong

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hdsim.errors import InputError
 from hdsim.log import foreign, naming
 from hdsim.log.mapping import (
+    MEASURED,
     TIME_UNITS,
     AngleChannel,
     Channels,
@@ -28,7 +29,6 @@ from hdsim.recording import Column, Event, Recording, Table
 
 Array = NDArray[np.float64]
 
-UNITS = {"angle": "rad", "velocity": "rad/s", "torque": "N m", "temperature": "degC"}
 _TOLD_GAPS = 50
 #: Range of what a constant rate leaves of stamps in whole ticks, in ticks: one, and the rate's own error.
 WHOLE_TICK = 1.05
@@ -325,7 +325,7 @@ def _origin(channel: _Channel) -> Origin:
 def _column(name: str, values: Array) -> Column:
     if name == "transmission_error":
         return Column(values, "rad", "measured output angle less motor angle over ratio")
-    return Column(values, UNITS[name.rsplit("_", 1)[-1]], "measured")
+    return Column(values, MEASURED[name], "measured")
 
 
 def write_imported(recording: Recording, path: str | Path) -> Path:

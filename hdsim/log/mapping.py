@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -52,6 +52,7 @@ class Origin(Parameters):
 class _Channel(Origin):
     """A channel's origin, and how its numbers become SI."""
 
+    si_unit: ClassVar[str]
     sign: Literal[1, -1] = 1
     """-1 where the recording counts in the other direction than the contract."""
     zero: float = 0.0
@@ -75,6 +76,7 @@ class _Sided(_Channel):
 class AngleChannel(_Sided):
     """An angle."""
 
+    si_unit: ClassVar[str] = "rad"
     unit: Literal["rad", "mrad", "deg", "arcmin", "arcsec", "rev", "count"]
     """Unit of the recorded numbers."""
     counts_per_turn: float | None = Field(None, gt=0)
@@ -97,6 +99,7 @@ class AngleChannel(_Sided):
 class VelocityChannel(_Sided):
     """An angular velocity."""
 
+    si_unit: ClassVar[str] = "rad/s"
     unit: Literal["rad/s", "deg/s", "rpm", "rev/s"]
     """Unit of the recorded numbers."""
 
@@ -109,6 +112,7 @@ class VelocityChannel(_Sided):
 class TorqueChannel(_Sided):
     """A torque, or the motor current that makes it."""
 
+    si_unit: ClassVar[str] = "N m"
     unit: Literal["N m", "mN m", "N cm", "A"]
     """Unit of the recorded numbers."""
     torque_constant_nm_per_a: float | None = Field(None, gt=0)
@@ -129,6 +133,7 @@ class TorqueChannel(_Sided):
 class TemperatureChannel(_Channel):
     """A temperature."""
 
+    si_unit: ClassVar[str] = "degC"
     unit: Literal["degC", "K", "degF"]
     """Unit of the recorded numbers."""
 
@@ -164,6 +169,15 @@ class Channels(Parameters):
         """The channels that there are, by name."""
         found = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: channel for name, channel in found.items() if channel is not None}
+
+
+def _si_unit(annotation: Any) -> str:
+    """Unit of the channel class in ``Class | None``."""
+    return next(str(one.si_unit) for one in get_args(annotation) if hasattr(one, "si_unit"))
+
+
+#: Every measured channel and its unit in a log: ``Channels`` is the one place where they are declared.
+MEASURED = {name: _si_unit(field.annotation) for name, field in Channels.model_fields.items()}
 
 
 class TimeSource(Parameters):

@@ -16,6 +16,7 @@ from pydantic import BaseModel
 
 import hdsim.kernel as k
 from hdsim._abi import SIGNATURES
+from hdsim.log.mapping import MEASURED
 from hdsim.parts import Effect
 from hdsim.scenario.fields import UNITS, split_unit
 from hdsim.scenario.schema import json_schema
@@ -25,7 +26,7 @@ from hdsim.testing.alone import SMOOTH_ROWS, Alone, Collector
 
 Array = NDArray[np.float64]
 
-#: Coordinates and channels that a signature may name.
+#: Coordinates that a signature may name.
 COORDINATES = frozenset(
     {
         "time",
@@ -37,18 +38,6 @@ COORDINATES = frozenset(
         "torque",
         "temperature",
         "frequency",
-    }
-)
-CHANNELS = frozenset(
-    {
-        "motor_angle",
-        "motor_velocity",
-        "motor_torque",
-        "output_angle",
-        "output_velocity",
-        "output_torque",
-        "load_torque",
-        "temperature",
     }
 )
 #: Smallest interesting size of each input, and its size in operation.
@@ -234,7 +223,7 @@ def check_class(kind: type[Effect], name: str) -> None:
     signature = kind.signature
     for what, named, known in (
         ("lives_in", signature.lives_in, COORDINATES),
-        ("channels", signature.channels, CHANNELS),
+        ("channels", signature.channels, frozenset(MEASURED)),
     ):
         assert named, f"{name}: signature.{what} is empty"
         assert set(named) <= known, (
