@@ -137,7 +137,7 @@ schema = str(json_schema(Scenario))
 assert all(name in schema for name in ("eddy_current_brake", "soft", "gentle"))
 assert Drive.model_validate({"preset": "my-joint", "mesh": {"model": "teeth", "contact": {"law": "soft"}}})
 """
-    done = run(folder, "-W", "error", "-c", code)
+    done = run(folder, "-W", "error::UserWarning", "-c", code)
     assert done.returncode == 0, done.stderr
 
 
