@@ -3,17 +3,56 @@
 numba's own cache watches only the file of the function itself: change a function that is called from
 another file, and the caller goes on running the old code. Here the stamp of a cache entry covers every file
 whose code can end up in compiled functions: the package's ``_*.py`` files and ``kernel.py``.
+
+The cache is beside the code (``__pycache__``); where that is read-only, numba keeps it in the user's cache.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core import event
 from numba.core.ccallback import CFunc
+
+from hdsim.console import waiting
+
+#: What a user reads while the first run on a machine compiles; about 30 s on one core at 3 GHz, measured.
+COMPILING = "compiling the model, once on this machine: about half a minute"
+
+
+class _Announcer(event.Listener):  # type: ignore[misc]
+    """Tells a terminal that something is compiled; compilations nest, the outermost one is told of."""
+
+    def __init__(self) -> None:
+        self._inside: list[ExitStack] = []
+
+    def on_start(self, event: Any) -> None:
+        """Begin to tell."""
+        told = ExitStack()
+        if not self._inside:
+            told.enter_context(waiting(COMPILING))
+        self._inside.append(told)
+
+    def on_end(self, event: Any) -> None:
+        """Stop telling."""
+        self._inside.pop().close()
+
+
+event.register("numba:compile", _Announcer())
+
+
+class _Callback(CFunc):
+    """A C callback whose compilation is an event, as that of numba's other functions is."""
+
+    def _compile_uncached(self) -> Any:
+        with event.trigger_event("numba:compile", data={"dispatcher": self}):
+            return super()._compile_uncached()  # type: ignore[misc]
 
 
 @cache
@@ -25,11 +64,20 @@ def _stamp() -> tuple[float, int]:
     return max(status.st_mtime for status in found), sum(status.st_size for status in found)
 
 
-def _watch_all_files(compiled: Any) -> None:
-    """Let the cache entry of ``compiled`` also depend on the stamp of all files."""
-    file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if file is not None:
-        file._source_stamp = (file._source_stamp, _stamp())
+def _keep(compiled: Any) -> None:
+    """Keep ``compiled`` on disk, in an entry that also depends on the stamp of all files."""
+    try:
+        compiled.enable_caching()
+    except RuntimeError:  # numba found no folder that can be written
+        warnings.warn(
+            "compiled code cannot be kept, every process compiles anew: neither the package's folder nor the "
+            "user's cache folder can be written; set NUMBA_CACHE_DIR to one that can",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return
+    file = compiled._cache._cache_file
+    file._source_stamp = (file._source_stamp, _stamp())
 
 
 def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -41,16 +89,15 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return lambda given: compiled(given, **options)
-    dispatcher = njit(**({"cache": True, "nogil": True, "error_model": "numpy"} | options))(function)
-    _watch_all_files(dispatcher)
+    dispatcher = njit(**({"nogil": True, "error_model": "numpy"} | options))(function)
+    _keep(dispatcher)
     return dispatcher
 
 
 def compiled_address(function: Callable[..., None], signature: Any) -> Any:
     """Compile a kernel to a C function; the result's ``address`` is valid as long as the result lives."""
     types = (signature.args, signature.return_type)
-    callback = CFunc(function, types, locals={}, options={"error_model": "numpy"})
-    callback.enable_caching()
-    _watch_all_files(callback)
+    callback = _Callback(function, types, locals={}, options={"error_model": "numpy"})
+    _keep(callback)
     callback.compile()
     return callback

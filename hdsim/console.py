@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -36,3 +38,34 @@ def reading(path: Path) -> Iterator[Callable[[float], None]]:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(f"reading {path.name}", total=1.0)
         yield lambda share: bar.update(task, completed=share)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Tell a terminal, on standard error, what is waited for and for how long already; nothing elsewhere.
+
+    Worker processes say nothing: their parent has the terminal. Where a progress bar has it already, it is a
+    plain line above the bar.
+    """
+    from multiprocessing import parent_process
+
+    if not sys.stderr.isatty() or parent_process() is not None:
+        yield
+    elif hasattr(sys.stderr, "rich_proxied_file"):
+        if what not in _since:
+            print(what, file=sys.stderr)
+        _since.setdefault(what, monotonic())
+        yield
+    else:
+        from rich.console import Console
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            bar.add_task(what, total=None)
+            bar.tasks[0].start_time = _since.setdefault(what, monotonic())
+            yield
+
+
+#: When something was waited for first: it may come in pieces.
+_since: dict[str, float] = {}

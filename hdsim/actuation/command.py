@@ -11,7 +11,8 @@ from pydantic import Field, model_validator
 from hdsim.actuation._kernels import controller as controller_kernel
 from hdsim.actuation._kernels import held_torque, motor_torque
 from hdsim.actuation.canonical import CanonicalController, Loop, Side, canonical_controller
-from hdsim.actuation.controllers import Controller, PositionController, VelocityController
+from hdsim.actuation.choice import PositionController, VelocityController
+from hdsim.actuation.controllers import Controller
 from hdsim.actuation.shapes import Hold
 from hdsim.actuation.signal_data import SignalData
 from hdsim.actuation.signals import AngleTrajectory, SignalModel, TorqueSignal, VelocityTrajectory
@@ -120,6 +121,10 @@ class _Servo(Part):
         if self.sample_period_s is not None:
             build.element(held_torque, [0.0])
             return
+        self.follow(build, self.signal.data)
+
+    def follow(self, build: Builder, reference: SignalData) -> None:
+        """Add the continuous controller on a reference at the side ``at``, of derivative order ``order``."""
         canonical = self.canonical(build.ratio)
         torque = min(self.limit, build.rated_torque_nm / abs(build.ratio))
         states = [
@@ -128,7 +133,7 @@ class _Servo(Part):
             )
             for k, gain in enumerate(canonical.C)
         ]
-        column = build.signal(self.signal.data)
+        column = build.signal(reference)
         build.element(controller_kernel, canonical.pack(column, self.order, self.limit), states=states)
 
 

@@ -23,9 +23,10 @@ from hdsim.errors import InputError
 from hdsim.estimate.bench import THREADS, Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import LEAD_IN_S
-from hdsim.estimate.records import CHANNELS, Array
+from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
 from hdsim.estimate.vector import Vector
+from hdsim.log.mapping import MEASURED
 from hdsim.plot import units
 
 #: Rate at which experiments are simulated, Hz; the noise counts at the rate of the data.
@@ -101,7 +102,7 @@ def propose(
         )
         for o in ranked
     ]
-    unit = units.Unit(CHANNELS[chosen.channel], 1.0)
+    unit = units.Unit(MEASURED[chosen.channel], 1.0)
     if unit.name == "rad":
         unit = units.for_error(chosen.difference)
     sentence = (

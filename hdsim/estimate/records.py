@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.log.mapping import MEASURED
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -16,17 +17,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: The contract's channels and their units.
-CHANNELS = {
-    "motor_angle": "rad",
-    "motor_velocity": "rad/s",
-    "motor_torque": "N m",
-    "output_angle": "rad",
-    "output_velocity": "rad/s",
-    "output_torque": "N m",
-    "load_torque": "N m",
-    "temperature": "degC",
-}
 #: Fewest samples, and shortest record, that a diagnosis can work with.
 FEWEST_SAMPLES, SHORTEST_S = 200, 0.5
 _WHY_SO_LONG = (
@@ -128,12 +118,12 @@ def record_from(recording: Recording, name: str = "") -> Record:
             "give the parts as records"
         )
     channels = {}
-    for channel in CHANNELS:
+    for channel in MEASURED:
         source = f"measured_{channel}" if f"measured_{channel}" in recording else channel
         if source in recording:
             channels[channel] = np.asarray(recording[source], dtype=float)
     if not channels:
-        raise InputError(f"{name}: no channel of {', '.join(CHANNELS)}; found {', '.join(recording)}")
+        raise InputError(f"{name}: no channel of {', '.join(MEASURED)}; found {', '.join(recording)}")
     return Record(name, time - time[0], channels, ratio=_ratio(recording))
 
 

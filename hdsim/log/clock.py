@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
-from hdsim.log.mapping import TIME_UNITS
 from hdsim.log.readers.contract import Numbers
+from hdsim.log.units import TIME_UNITS
 
 Array = NDArray[np.float64]
 

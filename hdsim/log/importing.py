@@ -14,6 +14,7 @@ from hdsim.errors import InputError
 from hdsim.log import foreign, naming
 from hdsim.log.clock import seconds, spread
 from hdsim.log.mapping import (
+    MEASURED,
     AngleChannel,
     Channels,
     IntervalMask,
@@ -30,7 +31,6 @@ from hdsim.recording import Column, Event, Recording, Table
 
 Array = NDArray[np.float64]
 
-UNITS = {"angle": "rad", "velocity": "rad/s", "torque": "N m", "temperature": "degC"}
 _TOLD_GAPS = 50
 
 
@@ -294,7 +294,7 @@ def _origin(channel: _Channel) -> Origin:
 def _column(name: str, values: Array) -> Column:
     if name == "transmission_error":
         return Column(values, "rad", "measured output angle less motor angle over ratio")
-    return Column(values, UNITS[name.rsplit("_", 1)[-1]], "measured")
+    return Column(values, MEASURED[name], "measured")
 
 
 def write_imported(recording: Recording, path: str | Path) -> Path:

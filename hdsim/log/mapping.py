@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field, model_validator
 
+from hdsim.log.units import ANGLE_UNITS, CURRENT_UNITS, TORQUE_UNITS, TURN, VELOCITY_UNITS
 from hdsim.parts import Parameters
 
 Side = Literal["motor", "output"]
-
-_TURN = 2 * math.pi
-#: Factor to SI and offset of each unit that a mapping may name, by kind of quantity.
-ANGLE_UNITS = {
-    "rad": 1.0,
-    "mrad": 1e-3,
-    "deg": _TURN / 360,
-    "arcmin": _TURN / 21600,
-    "arcsec": _TURN / 1296000,
-    "rev": _TURN,
-}
-VELOCITY_UNITS = {"rad/s": 1.0, "deg/s": _TURN / 360, "rpm": _TURN / 60, "rev/s": _TURN}
-_POUND_FORCE_N, _INCH_M = 4.4482216152605, 0.0254
-TORQUE_UNITS = {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2, "kN m": 1e3}
-TORQUE_UNITS |= {"lbf in": _POUND_FORCE_N * _INCH_M, "lbf ft": _POUND_FORCE_N * 12 * _INCH_M}
-CURRENT_UNITS = {"A": 1.0, "mA": 1e-3}
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 class Origin(Parameters):
@@ -55,6 +38,7 @@ class Origin(Parameters):
 class _Channel(Origin):
     """A channel's origin, and how its numbers become SI."""
 
+    si_unit: ClassVar[str]
     sign: Literal[1, -1] = 1
     """-1 where the recording counts in the other direction than the contract."""
     zero: float = 0.0
@@ -78,6 +62,7 @@ class _Sided(_Channel):
 class AngleChannel(_Sided):
     """An angle."""
 
+    si_unit: ClassVar[str] = "rad"
     unit: Literal["rad", "mrad", "deg", "arcmin", "arcsec", "rev", "count"]
     """Unit of the recorded numbers."""
     counts_per_turn: float | None = Field(None, gt=0)
@@ -94,12 +79,13 @@ class AngleChannel(_Sided):
     @property
     def factor(self) -> float:
         """Rad in one recorded unit."""
-        return _TURN / self.counts_per_turn if self.counts_per_turn else ANGLE_UNITS[self.unit]
+        return TURN / self.counts_per_turn if self.counts_per_turn else ANGLE_UNITS[self.unit]
 
 
 class VelocityChannel(_Sided):
     """An angular velocity."""
 
+    si_unit: ClassVar[str] = "rad/s"
     unit: Literal["rad/s", "deg/s", "rpm", "rev/s"]
     """Unit of the recorded numbers."""
 
@@ -112,6 +98,7 @@ class VelocityChannel(_Sided):
 class TorqueChannel(_Sided):
     """A torque, or the motor current that makes it."""
 
+    si_unit: ClassVar[str] = "N m"
     unit: Literal["N m", "mN m", "N cm", "kN m", "lbf in", "lbf ft", "A", "mA"]
     """Unit of the recorded numbers."""
     torque_constant_nm_per_a: float | None = Field(None, gt=0)
@@ -134,6 +121,7 @@ class TorqueChannel(_Sided):
 class TemperatureChannel(_Channel):
     """A temperature."""
 
+    si_unit: ClassVar[str] = "degC"
     unit: Literal["degC", "K", "degF"]
     """Unit of the recorded numbers."""
 
@@ -169,6 +157,15 @@ class Channels(Parameters):
         """The channels that there are, by name."""
         found = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: channel for name, channel in found.items() if channel is not None}
+
+
+def _si_unit(annotation: Any) -> str:
+    """Unit of the channel class in ``Class | None``."""
+    return next(str(one.si_unit) for one in get_args(annotation) if hasattr(one, "si_unit"))
+
+
+#: Every measured channel and its unit in a log: ``Channels`` is the one place where they are declared.
+MEASURED = {name: _si_unit(field.annotation) for name, field in Channels.model_fields.items()}
 
 
 class TimeSource(Parameters):

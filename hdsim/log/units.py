@@ -2,7 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import re
+
+TURN = 2 * math.pi
+#: Factor to SI and offset of each unit that a mapping may name, by kind of quantity.
+ANGLE_UNITS = {
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "deg": TURN / 360,
+    "arcmin": TURN / 21600,
+    "arcsec": TURN / 1296000,
+    "rev": TURN,
+}
+VELOCITY_UNITS = {"rad/s": 1.0, "deg/s": TURN / 360, "rpm": TURN / 60, "rev/s": TURN}
+_POUND_FORCE_N, _INCH_M = 4.4482216152605, 0.0254
+TORQUE_UNITS = {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2, "kN m": 1e3}
+TORQUE_UNITS |= {"lbf in": _POUND_FORCE_N * _INCH_M, "lbf ft": _POUND_FORCE_N * 12 * _INCH_M}
+CURRENT_UNITS = {"A": 1.0, "mA": 1e-3}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 #: What is written for each unit of a mapping, in lower case without spaces, dots and signs of multiplication.
 _WRITTEN: dict[tuple[str, str], str] = {

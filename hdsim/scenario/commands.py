@@ -1,4 +1,4 @@
-"""Commands about what people write: ``check``, ``schema``, ``effects``."""
+"""Commands about what people write: ``check``, ``schema``, ``effects``, ``examples``, ``new``."""
 
 from __future__ import annotations
 
@@ -112,11 +112,61 @@ def effects() -> None:
     """List the physical effects that a scenario can turn on, with their sources and the orders they show."""
     from rich.table import Table
 
-    from hdsim.effects import catalogue
+    from hdsim.effects import catalogue, outside
 
-    table = Table("effect", "what it is", "source", "orders per wave-generator turn")
+    homes = {name: one.distribution for name, one in outside().items()}
+    table = Table(
+        "effect", "what it is", "source", "orders per wave-generator turn", *(["from"] if homes else [])
+    )
     for name, effect in catalogue().items():
         orders = ", ".join(f"{order:g}" for order in effect.signature.orders)
-        table.add_row(name, effect.title, effect.source, orders)
+        home = [homes.get(name, "hdsim")] if homes else []
+        table.add_row(name, effect.title, effect.source, orders, *home)
     terminal = console()
     terminal.print(table)
+
+
+@click.command(short_help="List the scenarios that come with hdsim.")
+def examples() -> None:
+    """List the scenarios that come with hdsim, to start from with ``hdsim new``."""
+    from rich.table import Table
+
+    from hdsim.scenario.examples import description
+    from hdsim.scenario.examples import examples as shipped
+
+    table = Table("example", "what it shows")
+    for name, path in shipped().items():
+        table.add_row(name, description(path))
+    console().print(table)
+
+
+@click.command(short_help="Copy an example, or begin an effect of your own.")
+@click.argument("name", required=False, metavar="[EXAMPLE | effect]")
+@click.argument("out", required=False, metavar="[FILE | NAME]")
+@click.pass_context
+def new(context: click.Context, name: str | None, out: str | None) -> None:
+    """Copy an EXAMPLE to FILE [default: EXAMPLE.yaml], with what it extends and the schema for editors.
+
+    Without EXAMPLE they are listed. `hdsim new effect NAME` writes the folder hdsim-NAME: a package that adds
+    an effect to hdsim, with its test.
+    """
+    from hdsim.errors import InputError
+    from hdsim.scenario.examples import copy
+
+    if name is None:
+        context.invoke(examples)
+        return
+    if name == "effect":
+        from hdsim.scenario.effect_template import new_effect
+
+        if out is None:
+            raise InputError("hdsim new effect: expected a name, such as: hdsim new effect brake_drag")
+        written = new_effect(out)
+        for path in written:
+            click.echo(f"wrote {path}")
+        click.echo(f"next: pip install -e {written[0].parent}; pytest {written[0].parent}; hdsim effects")
+        return
+    written = copy(name, None if out is None else Path(out))
+    for path in written:
+        click.echo(f"wrote {path}")
+    click.echo(f"next: hdsim check {written[0]}; hdsim run {written[0]}")

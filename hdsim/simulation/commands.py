@@ -148,7 +148,7 @@ def tell_numbers(recording: Recording, scenario: Scenario) -> None:
 
 
 class progress:  # noqa: N801 - used as a function
-    """A progress bar over simulated time on a terminal; nothing elsewhere.
+    """A progress bar over simulated time on a terminal, once time goes on; nothing elsewhere.
 
     Args:
         total: length of the run, s.
@@ -173,9 +173,13 @@ class progress:  # noqa: N801 - used as a function
             console=Console(stderr=True),
             transient=True,
         )
-        self._bar.start()
         task = self._bar.add_task(self.title, total=self.total)
-        return lambda t: self._bar.update(task, completed=t)
+
+        def reached(t: float) -> None:
+            self._bar.start()  # not before: until then the terminal tells of what is compiled
+            self._bar.update(task, completed=t)
+
+        return reached
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

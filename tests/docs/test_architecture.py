@@ -78,7 +78,7 @@ def circle(edges: dict[str, set[str]]) -> list[str]:
 def room(module: str) -> str:
     """Package, or single file, of a module; the commands of every package belong to the command line."""
     parts = module.split(".")
-    if len(parts) == 1 or "commands" in parts[-1]:
+    if len(parts) == 1 or parts[1] == "__main__" or "commands" in parts[-1]:
         return "cli"  # the facade too, which hands out what the rooms have
     return parts[1]
 

@@ -165,7 +165,7 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
 def test_the_effect_that_the_documentation_adds_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    code, test = blocks(DOCS / "extending.md", "python")
+    code, test, _ = blocks(DOCS / "extending.md", "python")  # the third is of the package that is made anew
     name = "hdsim.effects.eddy_current_brake"
     path = tmp_path / "eddy_current_brake.py"
     path.write_text(code, encoding="utf-8")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hdsim.log.mapping import TORQUE_UNITS
+from hdsim.log.units import TORQUE_UNITS
 
 
 def test_torques_in_pounds() -> None:

@@ -16,8 +16,9 @@ from hdsim.log.guess.relations import moves
 from hdsim.log.guess.survey import Survey, survey
 from hdsim.log.guess.timing import find_time
 from hdsim.log.guess.torque import map_torques
-from hdsim.log.mapping import TIME_UNITS, Channels, Form
+from hdsim.log.mapping import Channels, Form
 from hdsim.log.readers.contract import Tell, missing, silent
+from hdsim.log.units import TIME_UNITS
 
 #: An axis moves where its travel is at least this share of the farthest one's.
 _MOVES = 0.05

@@ -14,8 +14,7 @@ import numpy as np
 from hdsim.errors import InputError
 from hdsim.log.guess.findings import Candidate
 from hdsim.log.guess.relations import Array, step_of, turn_of
-from hdsim.log.mapping import ANGLE_UNITS, CURRENT_UNITS, TORQUE_UNITS, VELOCITY_UNITS
-from hdsim.log.units import unit_of
+from hdsim.log.units import ANGLE_UNITS, CURRENT_UNITS, TORQUE_UNITS, VELOCITY_UNITS, unit_of
 
 #: Usual travel in rad and usual top speed in rad/s of either side; each decade above costs 1, below a half:
 #: a locked drive and a slow test are no rarity.

@@ -11,9 +11,8 @@ from hdsim.log.clock import spread
 from hdsim.log.guess.findings import Answer, Candidate, Draft, Ground
 from hdsim.log.guess.relations import Array
 from hdsim.log.guess.survey import Survey
-from hdsim.log.mapping import TIME_UNITS
 from hdsim.log.readers.contract import missing
-from hdsim.log.units import unit_of
+from hdsim.log.units import TIME_UNITS, unit_of
 
 #: Usual rates of recordings, Hz; each decade beyond costs 1. So does a unit that a fractional number seldom
 #: has.

@@ -7,7 +7,7 @@ import numpy as np
 from hdsim.log.guess.findings import Answer, Candidate, Channel, Draft, Ground
 from hdsim.log.guess.readings import stated_unit
 from hdsim.log.guess.relations import moves, slope
-from hdsim.log.mapping import CURRENT_UNITS, TORQUE_UNITS
+from hdsim.log.units import CURRENT_UNITS, TORQUE_UNITS
 
 #: Torque constants of motors that drive harmonic drives lie below this, N m/A; a larger one refers to the
 #: output.

@@ -1,0 +1,5 @@
+"""``python -m hdsim`` is ``hdsim``."""
+
+from hdsim.cli import main
+
+main()
