@@ -184,7 +184,8 @@ class Predictor:
         if plan.load == "output_torque":
             factor = ratio if plan.motion == "output_angle" else 1.0
             self._slow = SlowPart(record.time, factor * values / (2 * np.pi))
-            self._slow_torque = self._slow.of(record.filled("output_torque"))
+            #: What the sensor that is the load is compared with, shape (n,).
+            self.slow_torque = self._slow.of(record.filled("output_torque"))
         self.ratio = ratio
         self.runs = 0
 
@@ -332,7 +333,7 @@ class Predictor:
                 # What the sensor adds, and of that what a slow load could not be.
                 own = found["output_torque"] - found[CARRIED]
                 own = own - self._slow.of(own) if np.any(own) else own
-                found["output_torque"] = self._slow_torque + own
+                found["output_torque"] = self.slow_torque + own
         return found
 
 

@@ -20,6 +20,7 @@ def diagnose(
     out: Path,
     load: Any,
     force: bool,
+    black_box: bool,
 ) -> int:
     """Find what a model is missing against measured records.
 
@@ -33,7 +34,9 @@ def diagnose(
 
     scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
-        found = run(records, scenario, holdout=held, load=load, force=force, on_step=tell)
+        found = run(
+            records, scenario, holdout=held, load=load, force=force, black_box=black_box, on_step=tell
+        )
         tell("finding the next experiment, writing the report")
         told = gather(found)
         report = save(found, model, out, told)

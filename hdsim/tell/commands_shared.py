@@ -39,6 +39,11 @@ def measured_options(command: F) -> F:
                 help="Where the load's torque comes from [load_torque when measured, else scenario].",
             ),
             click.option("--force", is_flag=True, help="Go on in spite of errors in the data."),
+            click.option(
+                "--black-box",
+                is_flag=True,
+                help="Also say what boosted trees leave of the held-out data (hdsim[baseline]).",
+            ),
         )
     ):
         command = option(command)

@@ -31,6 +31,7 @@ def fit(
     out: Path,
     load: Any,
     force: bool,
+    black_box: bool,
 ) -> int:
     """Fit a scenario's numbers to measured records.
 
@@ -47,7 +48,7 @@ def fit(
     with Progress() as tell:
         found = hdsim.fit(
             records, scenario, holdout=held, free=free, fix=fix, apart=apart, load=load, force=force,
-            on_step=tell,
+            black_box=black_box, on_step=tell,
         )  # fmt: skip
         tell("writing the report")
         page = save_fit(found, model, out)
@@ -64,6 +65,7 @@ def _show(result: FitResult) -> None:
     from rich.text import Text
 
     from hdsim.console import console
+    from hdsim.tell.beside import baselines
     from hdsim.tell.fit_report import GAP_HEAD, gap_rows, summary
     from hdsim.tell.words import named_number, shown
 
@@ -92,6 +94,8 @@ def _show(result: FitResult) -> None:
     for row in gap_rows(result):
         gaps.add_row(*row)
     out.print(gaps)
+    for said in baselines(result.gap):
+        out.print(Text(said), highlight=False)
     for problem in result.data_problems:
         if problem.severity != "info":
             said = f"{problem.severity}: {problem.record}: {problem.channel}: {problem.message}"
