@@ -187,7 +187,7 @@ def _given(bench: Bench, series: Series) -> Array:
     """What is known of a series before anything is learnt, shape (n,)."""
     predictor = bench.predictors[series.record]
     if _is_load(predictor, series):
-        return predictor.slow_torque
+        return np.asarray(predictor.slow_torque)
     if series.channel == "output_angle":
         return predictor.motor_angle / predictor.ratio
     return np.zeros(len(series.measured))

@@ -31,8 +31,8 @@ LONG = 150
 _CAPTIONS = {
     "gap": "Root-mean-square difference between measurement and model on data that no fit has seen, in the "
     "unit of each channel (in brackets: as a share of the model as given). Whiskers: 95 % intervals over "
-    "blocks of time. Dashed line: noise of the sensor, as neighbouring readings differ by it. It is a mark and "
-    "no bound: errors that last over many readings are larger, and a model may foretell a part of them.",
+    "blocks of time. Dashed line: noise of the sensor, as neighbouring readings differ by it. It is a mark "
+    "and no bound: errors that last over many readings are larger, and a model may foretell a part of them.",
     "located": "How much of what the re-fitted model leaves is a function of one quantity, checked on "
     "blocks of time left out of the fit; the shares of related quantities overlap. Grey: measured samples. "
     "Orange: what the re-fitted model leaves. Green: what is left with what was found.",
