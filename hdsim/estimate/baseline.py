@@ -189,7 +189,7 @@ def _given(bench: Bench, series: Series) -> Array:
     if _is_load(predictor, series):
         return np.asarray(predictor.slow_torque)
     if series.channel == "output_angle":
-        return predictor.motor_angle / predictor.ratio
+        return np.asarray(predictor.motor_angle / predictor.ratio)
     return np.zeros(len(series.measured))
 
 
