@@ -107,6 +107,8 @@ class Scenario(Parameters):
             load_parts.append("torque over time")
         if load.gravity is not None:
             load_parts.append("gravity arm")
+        if load.arm is not None:
+            load_parts.append(f"{load.arm.joint} of {load.arm.file.name}")
         samples = round(run.duration_s * run.sample_rate_hz)
         lines = {
             "scenario": f"{self.name}: {about}" if about else self.name,
