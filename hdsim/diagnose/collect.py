@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,10 +21,11 @@ from hdsim.diagnose.search import Search, Stage
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Gap
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import Refit
-from hdsim.estimate.state import Added
+from hdsim.estimate.state import Added, State
 
 #: Places of a stage that are kept.
 PLACES = 12
@@ -52,8 +54,14 @@ def collect(
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
         laws=[
-            _law(one, added, found.stages, explained if len(found.named) == 1 else one.worth)
-            for one, added in zip(found.named, found.fit.state.added, strict=True)
+            _law(
+                one,
+                found.fit.state.added[k],
+                found.stages,
+                explained if len(found.named) == 1 else one.worth,
+                _own_held(bench, found.fit.state, k, predictions["after"]),
+            )
+            for k, one in enumerate(found.named)
         ],
         explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
         left=last.structured,
@@ -87,7 +95,21 @@ def _stage(stage: Stage) -> StageEvidence:
     )
 
 
-def _law(one: Named, added: Added, stages: Sequence[Stage], worth: float) -> LawEvidence:
+def _own_held(bench: Bench, state: State, k: int, predictions: Sequence[Array]) -> HeldOutEvidence | None:
+    """What held-out data say of one effect beside all others."""
+    less = replace(state, added=(*state.added[:k], *state.added[k + 1 :]))
+    try:
+        slope, spread = borne_out(
+            bench, {"refit": bench.predict(less, everything=True), "after": predictions}
+        )
+    except PredictionError:
+        return None
+    return HeldOutEvidence(slope=slope, spread=min(spread, 1e6))
+
+
+def _law(
+    one: Named, added: Added, stages: Sequence[Stage], worth: float, held: HeldOutEvidence | None
+) -> LawEvidence:
     own = max(_own(added, stages[-1].location), 0.0)
     return LawEvidence(
         name=one.name,
@@ -101,6 +123,8 @@ def _law(one: Named, added: Added, stages: Sequence[Stage], worth: float) -> Law
         own_first=_own_first(added, stages[-1].location),
         exact=catalogue()[one.name].signature.exact,
         at_limit=added.at_limit,
+        sharp=added.lives_in[0] == SHARP,
+        held=held,
     )
 
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.estimate.bench import Bench, Series
+from hdsim.estimate.bench import Bench
 from hdsim.estimate.records import Array
+from hdsim.estimate.series import Series
 
 #: Oscillators that stand for parts that ring: number, damping ratio (neighbours overlap), least frequency.
 OSCILLATORS, DAMPING_RATIO, SLOWEST_HZ = 12, 0.2, 0.5

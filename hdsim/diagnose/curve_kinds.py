@@ -11,8 +11,9 @@ import numpy as np
 from hdsim.diagnose.coordinates import coordinates
 from hdsim.diagnose.locate import Location
 from hdsim.effects.table import Acting, Coordinate, TableCurve
-from hdsim.estimate.bench import Bench, Series
+from hdsim.estimate.bench import Bench
 from hdsim.estimate.records import Array
+from hdsim.estimate.series import Series
 from hdsim.estimate.state import State
 
 #: Coordinates that are tried, and the part of the best located share that each must have.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from hdsim.diagnose.evidence import Evidence
+from hdsim.diagnose.evidence import Evidence, HeldOutEvidence
 from hdsim.diagnose.rules import RULES, Rules
 from hdsim.estimate.found import Part
 
@@ -114,7 +114,9 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     # What is left elsewhere than in its own coordinate is another effect's, and counts half.
     seen = 0.5 * (_log_odds(evidence.explained) + _log_odds(1.0 - law.own_left))
     explained = rules.explained * (seen - _log_odds(rules.explained_even))
-    held = rules.held * _held(evidence, rules)
+    # Beside others each is asked what held-out data show of its own.
+    held_out = law.held if k and law.held is not None else evidence.held
+    held = rules.held * _held(held_out, rules)
     found = [
         # What all explain together speaks for the first; of a later one it only says that all are too little.
         (
@@ -122,7 +124,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
             evidence.explained,
             min(explained, 0.0) if k else explained,
         ),
-        ("held-out data show the promised change", evidence.held.slope, min(held, 0.0) if k else held),
+        ("held-out data show the promised change", held_out.slope, min(held, 0.0) if k else held),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
     left = law.own_left
@@ -138,16 +140,22 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     if law.at_limit:
         found.append(("a number stands at the end of its range", 1.0, rules.limit))
     if k > 0:
-        found.append(("one more effect", float(k), rules.later))
+        if not (law.sharp and law.held is not None and _repeats(law.held, rules)):
+            # A sharp line that data hold which no step has seen is none that the search has chosen of many.
+            found.append(("one more effect", float(k), rules.later))
         found.append(
             ("part of what would be missing without it", law.needed, rules.needed * _log_odds(law.needed))
         )
     return found
 
 
-def _held(evidence: Evidence, rules: Rules) -> float:
+def _repeats(held: HeldOutEvidence, rules: Rules) -> bool:
+    """Whether held-out data show a change by itself beyond chance, and more of it than none."""
+    return held.slope > 0.5 and held.slope > rules.repeats * held.spread
+
+
+def _held(held: HeldOutEvidence, rules: Rules) -> float:
     """Log odds of "all of the promised change is there" against "none is", by its held-out slope."""
-    held = evidence.held
     variance = held.spread**2 + rules.held_mismatch**2
     odds = (2.0 * held.slope - 1.0) / (2.0 * variance)
     return float(min(max(odds, -rules.held_against), rules.held_for))

@@ -60,6 +60,15 @@ class StageEvidence(Part):
     """The effect that the pass added."""
 
 
+class HeldOutEvidence(Part):
+    """How much of the change that added effects promise shows on data that no step has seen."""
+
+    slope: float = 1.0
+    """Regression of the held-out residual on the promised change: 1 where all of it is there, 0 none."""
+    spread: float = 0.0
+    """Its standard error over blocks of time: large where the held-out data hardly excite the effects."""
+
+
 class LawEvidence(Part):
     """One effect that the search has added, with all others beside it."""
 
@@ -84,15 +93,10 @@ class LawEvidence(Part):
     """Whether its formula is exact, as statics are, and may leave nothing there."""
     at_limit: bool = False
     """Whether one of its numbers stands at the end of its range."""
-
-
-class HeldOutEvidence(Part):
-    """How much of the change that the added effects promise shows on data that no step has seen."""
-
-    slope: float = 1.0
-    """Regression of the held-out residual on the promised change: 1 where all of it is there, 0 none."""
-    spread: float = 0.0
-    """Its standard error over blocks of time: large where the held-out data hardly excite the effects."""
+    sharp: bool = False
+    """Whether it makes lines in an order spectrum, which no smooth law does."""
+    held: HeldOutEvidence | None = None
+    """How much of its own change held-out data show beside all others; None: not asked."""
 
 
 class RestEvidence(Part):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hdsim.diagnose.late import read_late
 from hdsim.diagnose.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnose.name import LEAST_SHARE, SAME, Named, name_effect
 from hdsim.diagnose.revise import revised, without
@@ -115,7 +116,7 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
 
 def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Fit | None:
     """The model with one more effect; None when nothing significant is left, or nothing that matters."""
-    current = found.fit
+    current = found.fit = read_late(bench, found.fit)
     title = "refit" if not found.named else f"with {found.named[-1].name}"
     during("locate", f"locating what is left {title}")
     found.left = left_of(bench, current)

@@ -26,6 +26,7 @@ from hdsim.estimate.data_problems import Check
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.estimate.numbers import Interval
+from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
 from hdsim.estimate.predict import LoadSource, PredictionError
@@ -33,7 +34,7 @@ from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit, tie, together
 from hdsim.estimate.state import State, state_of
-from hdsim.estimate.suspect import delays, one_way, suspicions
+from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.thin import readings_of_means
 from hdsim.estimate.write import fitted_numbers
 
@@ -69,6 +70,7 @@ def diagnose(
     *,
     holdout: Sequence[Recording | Record] = (),
     load: LoadSource | None = None,
+    zeros: Zeros = "campaign",
     force: bool = False,
     black_box: bool = False,
     on_step: Callable[[str], object] | None = None,
@@ -80,6 +82,7 @@ def diagnose(
         scenario: the model; what it commands does not matter, its motion is the measured one.
         holdout: records that only the proof sees; parts of ``measured`` when there are none.
         load: where the load's torque comes from; ``output_torque`` takes what the joint's sensor measures.
+        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
         force: go on in spite of errors in the data.
         black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
         on_step: told what is being done.
@@ -94,7 +97,8 @@ def diagnose(
     if black_box:
         trees()
     with one_blas_thread():
-        return _diagnosed(measured, scenario, holdout, load, force, black_box, on_step or (lambda _: None))
+        tell = on_step or (lambda _: None)
+        return _diagnosed(measured, scenario, holdout, load, zeros, force, black_box, tell)
 
 
 def _diagnosed(
@@ -102,6 +106,7 @@ def _diagnosed(
     scenario: Scenario,
     holdout: Sequence[Recording | Record],
     load: LoadSource | None,
+    zeros: Zeros,
     force: bool,
     black_box: bool,
     tell: Callable[[str], object],
@@ -122,7 +127,7 @@ def _diagnosed(
     start = state_of(scenario)
     with step("compare", "predicting the measured channels"):
         readings = readings_of_means([*records, *held], load=load, locked=locked_side(scenario))
-        bench = bench_for(records, held, scenario, load, readings=readings)
+        bench = bench_for(records, held, scenario, load, readings=readings, zeros=zeros)
     with step("refit", "re-fitting the model's own numbers"):
         try:
             base = refit(bench, start)
@@ -167,7 +172,7 @@ def _diagnosed(
         gap = with_baselines(bench, start, gap, black_box=black_box)
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
-    problems += [*doubts, *one_way(bench)]
+    problems += [*doubts, *one_way(bench), *moving_zeros(bench, current.predictions)]
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)

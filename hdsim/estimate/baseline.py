@@ -24,13 +24,14 @@ from numpy.typing import NDArray
 
 from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import InputError
-from hdsim.estimate.bench import Bench, Series
+from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Gap
 from hdsim.estimate.offsets import groups
 from hdsim.estimate.orders import order_lines
 from hdsim.estimate.predict import LEAD_IN_S, Predictor
 from hdsim.estimate.prove import held_out_gap
 from hdsim.estimate.records import Array
+from hdsim.estimate.series import Series
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
@@ -204,7 +205,7 @@ def _fitted(bench: Bench, columns: Sequence[Array], fold: int | None = None) -> 
     found = [_given(bench, s) for s in bench.series]
     for channel in bench.channels:
         own = [k for k, s in enumerate(bench.series) if s.channel == channel]
-        zeros = [group for group in groups(bench.series) if group[0] in own]
+        zeros = [group for group in groups(bench.series, bench.zeros) if group[0] in own]
         designs, rows = {}, {}
         for k in own:
             n = len(columns[k])

@@ -5,16 +5,16 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
-from hdsim.estimate.offsets import offset_columns, offsets_of
+from hdsim.estimate.offsets import Zeros, offset_columns, offsets_of
 from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
-from hdsim.estimate.records import Array, Mask
+from hdsim.estimate.records import Array
+from hdsim.estimate.series import Series
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
@@ -34,44 +34,20 @@ SETTLE_S = 0.05
 MODEL_NOISE = 0.1
 
 
-@dataclass
-class Series:
-    """One predicted channel of one record.
-
-    Attributes:
-        record: index of the record's predictor.
-        channel: name of the channel.
-        measured: shape (n,).
-        train: samples that fits may see.
-        hold: samples that only the proof sees.
-        block: shape (n,), number of the block that each sample belongs to, unique over all records.
-        noise: standard deviation of the channel's noise.
-        reading: the same of a single reading, where a sample is the mean of several.
-        sigma: standard deviation by which residuals are divided.
-    """
-
-    record: int
-    channel: str
-    measured: Array
-    train: Mask
-    hold: Mask
-    block: NDArray[np.int64]
-    noise: float
-    reading: float
-    sigma: float = 1.0
-
-
 class Bench:
     """Measured records with their predictors.
 
     Args:
         training: predictors of the records that fits see.
         holdout: predictors of records that they don't; empty: parts of the training records are held out.
+        zeros: whether a torque sensor has one zero in all records, or one in each.
     """
 
-    def __init__(self, training: Sequence[Predictor], holdout: Sequence[Predictor] = ()) -> None:
+    def __init__(
+        self, training: Sequence[Predictor], holdout: Sequence[Predictor] = (), zeros: Zeros = "campaign"
+    ) -> None:
         self.predictors = [*training, *holdout]
-        self.training = len(training)
+        self.training, self.zeros = len(training), zeros
         self.series: list[Series] = []
         self.blocks = 0
         for index, predictor in enumerate(self.predictors):
@@ -168,8 +144,8 @@ class Bench:
     def trace(self, base: Sequence[Array], there: Sequence[Array]) -> Array:
         """Whitened difference of two sets of predictions, offsets removed, shape (rows,)."""
         changes = [b - a for a, b in zip(base, there, strict=True)]
-        zeros = offsets_of(self.series, changes, drift=False)
-        return self.stacked([change - zero for change, zero in zip(changes, zeros, strict=True)])
+        shifts = offsets_of(self.series, changes, self.zeros, drift=False)
+        return self.stacked([change - zero for change, zero in zip(changes, shifts, strict=True)])
 
     def ranges(self, state: State) -> dict[str, float]:
         """What the training records cover, by the names that fittings use.
@@ -271,7 +247,7 @@ class Bench:
 
     def offsets(self, predictions: Sequence[Array], *, drift: bool = False) -> list[float]:
         """The sensors' zeros, SI units: what is measured less what is predicted, by ``offsets_of``."""
-        return offsets_of(self.series, self._apart(predictions), drift=drift)
+        return offsets_of(self.series, self.apart(predictions), self.zeros, drift=drift)
 
     def residuals(self, predictions: Sequence[Array], *, drift: bool = False) -> list[Array]:
         """Measured less predicted, less the sensor's zero; empty where nothing is predicted.
@@ -281,10 +257,11 @@ class Bench:
             drift: whether zeros may drift between records: where what is missing is judged, not where numbers
                 are fitted, which would be bent by as much as is forgiven.
         """
-        zeros = self.offsets(predictions, drift=drift)
-        return [apart - zero for apart, zero in zip(self._apart(predictions), zeros, strict=True)]
+        offsets = self.offsets(predictions, drift=drift)
+        return [apart - offset for apart, offset in zip(self.apart(predictions), offsets, strict=True)]
 
-    def _apart(self, predictions: Sequence[Array]) -> list[Array]:
+    def apart(self, predictions: Sequence[Array]) -> list[Array]:
+        """Measured less predicted; empty where nothing is predicted."""
         return [
             s.measured - predicted if len(predicted) else np.zeros(0)
             for s, predicted in zip(self.series, predictions, strict=True)
@@ -292,7 +269,7 @@ class Bench:
 
     def offset_columns(self) -> Array:
         """What a shift of each sensor's zero does to the rows of ``stacked``, shape (rows, zeros)."""
-        return offset_columns(self.series, self.training)
+        return offset_columns(self.series, self.training, self.zeros)
 
     def block_powers(self, predictions: Sequence[Array]) -> Array:
         """Power of the whitened training residual in each block, shape (blocks,)."""

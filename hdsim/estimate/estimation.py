@@ -17,6 +17,7 @@ from hdsim.estimate.determine import UNDETERMINED
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.found import Gap
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, undeclared
+from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked
 from hdsim.estimate.predict import LoadSource, PredictionError
@@ -25,7 +26,7 @@ from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit
 from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
-from hdsim.estimate.suspect import delays, one_way, suspicions
+from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.vector import Vector, sensitivities
 
 if TYPE_CHECKING:
@@ -104,13 +105,15 @@ def estimate(
     fix: Collection[str] = (),
     apart: Collection[str] = (),
     load: LoadSource | None = None,
+    zeros: Zeros = "campaign",
     force: bool = False,
     black_box: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
     """Fit a scenario's numbers to measured records; this is ``hdsim.fit``.
 
-    The numbers are shared by all records; the sensors' offsets and the zero of a locked drive belong to each.
+    The numbers are shared by all records, and so are the torque sensors' zeros (``zeros``); an angle's, and
+    that of a locked drive, belong to each.
 
     Args:
         measured: records that the fit sees.
@@ -121,6 +124,7 @@ def estimate(
         fix: paths of numbers that do not.
         apart: paths of numbers of a group that move by themselves.
         load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
+        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
         force: go on in spite of errors in the data.
         black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
         on_step: told what is being done.
@@ -135,7 +139,7 @@ def estimate(
     tell("checking the data")
     records, held, checks = checked(measured, scenario, holdout=holdout, force=force)
     tell("predicting the measured channels")
-    bench, start = bench_for(records, held, scenario, load), state_of(scenario)
+    bench, start = bench_for(records, held, scenario, load, zeros=zeros), state_of(scenario)
     locked = all(predictor.plan.locked for predictor in bench.predictors)
     known = base_freedoms(start, bench.channels, load_known=bench.load_known, locked=locked, apart=apart)
     frees = chosen(start, known, free=free, fix=fix, apart=apart)
@@ -151,7 +155,8 @@ def estimate(
     gap, predictions = gaps(bench, states)
     gap = with_baselines(bench, start, gap, black_box=black_box)
     problems = [problem for check in checks for problem in check.problems]
-    problems += [*suspicions(bench, found, start), *delays(bench, found.intervals), *one_way(bench)]
+    problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
+    problems += [*one_way(bench), *moving_zeros(bench, found.fit.predictions)]
     own = found.fit.frees
     covariance, names = found.fit.covariance[: len(own), : len(own)], [each.name for each in own]
     matrix = correlations(covariance)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
 from hdsim.estimate.records import Array
+from hdsim.estimate.series import Series
 
-if TYPE_CHECKING:
-    from hdsim.estimate.bench import Series
-
+#: Whether a torque sensor has one zero in all records, or was zeroed before each.
+Zeros = Literal["campaign", "record"]
+ZEROS: tuple[Zeros, Zeros] = ("campaign", "record")
 #: Standard deviations of a channel's noise by which its zero may move from one record to the next (estimate:
 #: what nobody would see in a record need not be explained).
 DRIFT = 2.0
 
 
-def groups(series: Sequence[Series]) -> list[list[int]]:
+def groups(series: Sequence[Series], zeros: Zeros) -> list[list[int]]:
     """Series that share a zero, as their numbers.
 
     A torque sensor, or a current, has one zero in a campaign: what differs between records at constant speed
@@ -25,12 +26,14 @@ def groups(series: Sequence[Series]) -> list[list[int]]:
     """
     found: dict[tuple[str, int], list[int]] = {}
     for k, one in enumerate(series):
-        own = one.record if one.channel.endswith("angle") else -1
+        own = one.record if zeros == "record" or one.channel.endswith("angle") else -1
         found.setdefault((one.channel, own), []).append(k)
     return list(found.values())
 
 
-def offsets_of(series: Sequence[Series], values: Sequence[Array], *, drift: bool) -> list[float]:
+def offsets_of(
+    series: Sequence[Series], values: Sequence[Array], zeros: Zeros, *, drift: bool
+) -> list[float]:
     """The zero of every series, of what is measured less predicted or of a change of it.
 
     The least-squares constant of its group over the samples that a fit may see. A record's own mean lies that
@@ -39,10 +42,11 @@ def offsets_of(series: Sequence[Series], values: Sequence[Array], *, drift: bool
     Args:
         series: all of them.
         values: shape (n,) each, or (0,) where nothing was predicted.
+        zeros: which of them share one.
         drift: whether zeros may drift; not in a derivative.
     """
     found = [0.0] * len(series)
-    for group in groups(series):
+    for group in groups(series, zeros):
         there = [k for k in group if len(values[k])]
         means: dict[int, float] = {}
         common = weights = 0.0
@@ -62,17 +66,18 @@ def offsets_of(series: Sequence[Series], values: Sequence[Array], *, drift: bool
     return found
 
 
-def offset_columns(series: Sequence[Series], training: int) -> Array:
+def offset_columns(series: Sequence[Series], training: int, zeros: Zeros) -> Array:
     """What a shift of each zero does to the whitened training samples, shape (rows, zeros).
 
     Args:
         series: all of them.
         training: number of the records that fits see.
+        zeros: which of them share one.
     """
     seen = [k for k, one in enumerate(series) if one.record < training]
     sizes = {k: int(series[k].train.sum()) for k in seen}
     columns = []
-    for group in groups(series):
+    for group in groups(series, zeros):
         if not any(sizes.get(k) for k in group):
             continue
         columns.append(

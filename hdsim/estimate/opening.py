@@ -9,6 +9,7 @@ from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import check_records
 from hdsim.estimate.data_problems import Check
+from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.predict import LoadSource, Locked, predictors
 from hdsim.estimate.records import Record, record_from
 from hdsim.estimate.thin import over, thinned
@@ -57,6 +58,7 @@ def bench_for(
     load: LoadSource | None = None,
     *,
     readings: int = 1,
+    zeros: Zeros = "campaign",
 ) -> Bench:
     """The records with their predictors.
 
@@ -67,6 +69,7 @@ def bench_for(
         load: where the load's torque comes from.
         readings: successive readings of which means are taken, of the record that is read fastest; of the
             others as many as come in the same time.
+        zeros: whether a torque sensor has one zero in all records, or one in each.
 
     Raises:
         InputError: nothing can be predicted.
@@ -78,4 +81,4 @@ def bench_for(
     )
     ratio, locked = scenario.drive.ratio, locked_side(scenario)
     training = predictors(records, ratio, load=load, locked=locked)
-    return Bench(training, predictors(held, ratio, load=load, locked=locked))
+    return Bench(training, predictors(held, ratio, load=load, locked=locked), zeros)

@@ -11,7 +11,10 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.records import Array
 
 #: Order spectra: densely up to the first number, at integers up to the second.
-DENSE_ORDER, HIGHEST_ORDER = 4.6, 60
+DENSE_ORDER, HIGHEST_ORDER = 4.6, 60.0
+#: Fewest periods of an order that make it one, in a turn and more, and in less than one, where no order comes
+#: back to where it began (estimates: with fewer a slow change, or a loop of hysteresis, looks like it).
+PERIODS, PERIODS_IN_PART = 1.5, 8.0
 #: Samples of which an order spectrum is made.
 SPECTRUM_SAMPLES = 8000
 #: Share of a channel's residual that a line of an order spectrum must hold to be listed.
@@ -33,36 +36,16 @@ def order_lines(bench: Bench, residuals: Sequence[Array], channel: str, most: in
 
     The amplitude at an order is the least-squares one over the measured angle, so the speed may vary.
     """
-    angle: list[Array] = []
-    value: list[Array] = []
-    fastest = turns = 0.0
-    rate = np.inf
-    for series, residual in zip(bench.series, residuals, strict=True):
-        if series.channel != channel or not len(residual) or not series.train.any():
-            continue
-        predictor = bench.predictors[series.record]
-        angle.append(predictor.motor_angle[series.train])
-        value.append(residual[series.train])
-        turns = max(turns, float(np.ptp(angle[-1])) / (2 * np.pi))
-        fastest = max(fastest, float(np.quantile(np.abs(predictor.motor_velocity), 0.5)) / (2 * np.pi))
-        rate = min(rate, 1.0 / predictor.record.period_s)
-    if not angle or turns < 1.0 or fastest == 0.0:
+    over = over_angle(bench, residuals, channel)
+    if over is None:
         return []
-    theta, e = np.concatenate(angle), np.concatenate(value)
-    e = e - e.mean()
+    theta, e, turns, highest = over.angle, over.value, over.turns, over.highest
     power = float(np.mean(e**2))
-    if power == 0.0:
-        return []
-    highest = min(float(HIGHEST_ORDER), 0.4 * rate / fastest)
     step = max(0.4 / turns, DENSE_ORDER / 600)
-    orders = np.arange(max(0.5, 1.5 / turns), min(DENSE_ORDER, highest), step)
-    orders = np.unique(np.concatenate([orders, np.arange(1.0, int(highest) + 1)]))
+    orders = np.arange(over.lowest, min(DENSE_ORDER, highest), step)
+    orders = np.unique(np.concatenate([orders, np.arange(np.ceil(over.lowest), int(highest) + 1)]))
     if not len(orders):
-        return []  # too fast for the sampling to see any order
-    # A random part of the samples: taking every k-th would alias the high orders.
-    if len(theta) > SPECTRUM_SAMPLES:
-        part = np.sort(np.random.default_rng(0).choice(len(theta), SPECTRUM_SAMPLES, replace=False))
-        theta, e = theta[part], e[part]
+        return []
     waves = np.exp(-1j * np.outer(orders, theta))
     lines: list[Line] = []
     rest = e
@@ -86,6 +69,56 @@ def order_lines(bench: Bench, residuals: Sequence[Array], channel: str, most: in
             for order, size in zip(found, sizes, strict=True)
         ]
     return sorted(lines, key=lambda line: -line.share)
+
+
+@dataclass(frozen=True)
+class OverAngle:
+    """A channel's residual over the motor's angle, shape (n,) each; of many samples a part.
+
+    Attributes:
+        angle: rad.
+        velocity: rad/s.
+        value: without its mean.
+        turns: of the wave generator in the longest record.
+        lowest: order that the motion lets be seen.
+        highest: order that the sampling lets be seen.
+        period_s: of the samples.
+    """
+
+    angle: Array
+    velocity: Array
+    value: Array
+    turns: float
+    lowest: float
+    highest: float
+    period_s: float
+
+
+def over_angle(bench: Bench, residuals: Sequence[Array], channel: str) -> OverAngle | None:
+    """The training samples of a channel; None where no order makes a period, or without anything left."""
+    parts: list[tuple[Array, Array, Array]] = []
+    fastest = turns = period = 0.0
+    for series, residual in zip(bench.series, residuals, strict=True):
+        if series.channel != channel or not len(residual) or not series.train.any():
+            continue
+        predictor, seen = bench.predictors[series.record], series.train
+        parts.append((predictor.motor_angle[seen], predictor.motor_velocity[seen], residual[seen]))
+        turns = max(turns, float(np.ptp(parts[-1][0])) / (2 * np.pi))
+        fastest = max(fastest, float(np.quantile(np.abs(predictor.motor_velocity), 0.5)) / (2 * np.pi))
+        period = max(period, predictor.record.period_s)
+    highest = min(HIGHEST_ORDER, 0.4 / period / fastest) if fastest > 0.0 else 0.0
+    lowest = max(0.5, (PERIODS if turns >= 1.0 else PERIODS_IN_PART) / max(turns, 1e-9))
+    if lowest > highest:
+        return None
+    angle, velocity, value = (np.concatenate(column) for column in zip(*parts, strict=True))
+    value = value - value.mean()
+    if not np.any(value):
+        return None
+    if len(value) > SPECTRUM_SAMPLES:
+        # A random part: taking every k-th would alias the high orders.
+        part = np.sort(np.random.default_rng(0).choice(len(value), SPECTRUM_SAMPLES, replace=False))
+        angle, velocity, value = angle[part], velocity[part], value[part]
+    return OverAngle(angle, velocity, value, turns, lowest, highest, period)
 
 
 def _refined(theta: Array, e: Array, order: float, step: float) -> float:

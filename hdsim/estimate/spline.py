@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,10 +22,6 @@ TAIL_S = 0.02
 SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
 #: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
 STEPS_ALLOW = 1.1
-#: Stretches of time over which a rate judges two splines, and standard errors by which one must be better.
-STRETCHES, CLEARLY = 30, 2.0
-#: Delays of a rate's low-pass that are tried, in samples.
-DELAYS = (0.0, *(2.0**k for k in np.arange(-1.0, 6.1, 0.5)))
 #: Part of its own size that the other splines leave of a B-spline, squared, below which rounding decides.
 SINGULAR = 1e-12
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
@@ -49,7 +46,7 @@ def smoothed(
     Errors that last for some samples (a jittering clock, a resolver) are no white noise either: what is left
     out is foretold by its neighbours' errors, fine knots follow them (Altman 1990, Journal of the American
     Statistical Association 85:749), and differentiated twice they drown the acceleration. Where the rate is
-    measured as well, the splines are judged by it: by what they were not fitted to.
+    measured as well, the spline is fitted to both where that is likelier (``hdsim.estimate.rates``).
 
     Args:
         time: shape (n,), s, strictly increasing.
@@ -60,16 +57,20 @@ def smoothed(
     """
     from scipy.interpolate import CubicSpline, PPoly
 
-    best, chosen = best_spline(time, values, step)
+    _, chosen = best_spline(time, values, step)
     if chosen is None:
         exact = CubicSpline(time, values)
         return np.asarray(exact.x), np.asarray(exact.c[::-1])
+    beside: Rate | None = None
     if rate is not None:
-        chosen = borne_out(time, values, chosen, *rate)
-        best = _score(time, values, chosen)
+        from hdsim.estimate.rates import beside_rate
+
+        chosen, beside = beside_rate(time, values, chosen, *rate)
     if motion:
-        jumping = _jumping(time, values, chosen)
-        if jumping is not None and _score(time, values, jumping) < best:
+        jumping = _jumping(time, values, chosen, beside)
+        if jumping is not None and _score(time, values, jumping, beside) < _score(
+            time, values, chosen, beside
+        ):
             chosen = jumping
     pieces_of = PPoly.from_spline(chosen)
     keep = np.diff(pieces_of.x) > 0
@@ -77,7 +78,22 @@ def smoothed(
     return breaks, np.asarray(pieces_of.c[::-1][:, keep])
 
 
-def least_squares_spline(time: Array, values: Array, knots: Array) -> BSpline:
+@dataclass(frozen=True)
+class Rate:
+    """A measured derivative of a channel.
+
+    Attributes:
+        values: shape (n,), unit of the channel a second.
+        trusted: shape (n,), samples that count.
+        weight: what an error of it weighs beside one of the channel, s.
+    """
+
+    values: Array
+    trusted: Mask
+    weight: float
+
+
+def least_squares_spline(time: Array, values: Array, knots: Array, rate: Rate | None = None) -> BSpline:
     """The cubic spline of least squares, in a time that is linear in the samples.
 
     The normal equations of B-splines are banded and well conditioned (de Boor, A Practical Guide to Splines,
@@ -87,6 +103,7 @@ def least_squares_spline(time: Array, values: Array, knots: Array) -> BSpline:
         time: shape (n,), strictly increasing.
         values: shape (n,).
         knots: shape (c + 4,), increasing, four equal ones at either end.
+        rate: what its derivative is fitted to beside them.
 
     Raises:
         LinAlgError: a stretch between knots has no samples.
@@ -98,6 +115,10 @@ def least_squares_spline(time: Array, values: Array, knots: Array) -> BSpline:
     c = len(knots) - 4
     design = BSpline.design_matrix(time, knots, 3)
     parts, at = design.data.reshape(-1, 4), design.indices.reshape(-1, 4)
+    if rate is not None:
+        slopes = rate.weight * _slopes(time, knots, at) * rate.trusted[:, None]
+        parts, at = np.vstack([parts, slopes]), np.vstack([at, at])
+        values = np.concatenate([values, np.where(rate.trusted, rate.weight * rate.values, 0.0)])
     band, right = np.zeros((4, c)), np.zeros(c)
     for i in range(4):
         right += np.bincount(at[:, i], parts[:, i] * values, c)
@@ -107,6 +128,23 @@ def least_squares_spline(time: Array, values: Array, knots: Array) -> BSpline:
     if np.any(factor[0] ** 2 <= SINGULAR * band[0]):
         raise np.linalg.LinAlgError("a stretch between knots has no samples")
     return BSpline(knots, cho_solve_banded((factor, True), right), 3)
+
+
+def _slopes(time: Array, knots: Array, at: Array) -> Array:
+    """Derivatives of the four cubic B-splines at each time, shape (n, 4): de Boor, ch. X, Eq. 8.
+
+    Args:
+        time: shape (n,).
+        knots: shape (c + 4,).
+        at: numbers of the B-splines, shape (n, 4).
+    """
+    from scipy.interpolate import BSpline
+
+    parabolas = BSpline.design_matrix(time, knots[1:-1], 2).data.reshape(-1, 3)
+    first = at[:, :1] + np.arange(1, 4)
+    heights = 3.0 * parabolas / (knots[first + 3] - knots[first])
+    none = np.zeros((len(time), 1))
+    return np.asarray(np.hstack([none, heights]) - np.hstack([heights, none]))
 
 
 def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[float, BSpline | None]:
@@ -119,7 +157,7 @@ def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[
     for spacing in SPACINGS:
         if int((n - 1) / spacing) < 4:
             break
-        spline = _uniform(time, values, spacing)
+        spline = uniform(time, values, spacing)
         if spline is None:
             continue
         rest = float(np.mean((values - spline(time)) ** 2))
@@ -137,76 +175,30 @@ def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[
     return best, chosen
 
 
-def borne_out(time: Array, values: Array, chosen: BSpline, rate: Array, trusted: Mask) -> BSpline:
-    """The spline, or a coarser one whose derivative clearly foretells the measured rate better.
-
-    Only coarser ones are asked: a rate that was differenced from the same readings shares their errors, and
-    would have finer ones follow them. A rate may be filtered, and its filter follows from the slow motion
-    that both splines have: behind it the detail that one of them lacks must show, if it is real.
-
-    Args:
-        time: shape (n,), s.
-        values: shape (n,).
-        chosen: the spline through the values.
-        rate: shape (n,), in any unit.
-        trusted: shape (n,), samples of the rate that count.
-    """
-    stretch = (np.arange(len(time)) * STRETCHES // len(time))[trusted]
-
-    def missed(slope: Array, delay: float, order: int) -> Array:
-        """Power of the rate in each stretch that a derivative behind a filter does not foretell."""
-        read = _filtered(slope, delay, order)
-        columns = np.column_stack([read, np.ones(len(time))])[trusted]
-        ours, *_ = np.linalg.lstsq(columns, rate[trusted], rcond=None)
-        left = (rate[trusted] - columns @ ours) ** 2
-        return np.asarray(np.bincount(stretch, left, STRETCHES) + 1e-300, dtype=float)
-
-    best, least, chosen_slope = chosen, np.inf, chosen(time, nu=1)
-    for spacing in SPACINGS:
-        if int((len(time) - 1) / spacing) < 4:
-            break
-        spline = _uniform(time, values, spacing)
-        if spline is None or len(spline.c) >= len(chosen.c):
-            continue
-        slope = spline(time, nu=1)
-        tried = [(missed(slope, delay, order), delay, order) for delay in DELAYS for order in (1, 2)]
-        now, delay, order = min(tried, key=lambda one: float(one[0].sum()))
-        # Of the logarithms a hiccup of the log counts as one stretch among the others.
-        better = np.log(missed(chosen_slope, delay, order) / now)
-        clear = float(better.mean()) > CLEARLY * float(better.std()) / np.sqrt(STRETCHES)
-        if clear and now.sum() < least:
-            best, least = spline, float(now.sum())
-    return best
-
-
-def _filtered(values: Array, delay: float, order: int) -> Array:
-    """Values behind equal first-order low-passes in series, which together delay by so many samples."""
-    from scipy.signal import lfilter
-
-    old = delay / (delay + order)
-    for _ in range(order if delay > 0 else 0):
-        values, _ = lfilter([1.0 - old], [1.0, -old], values, zi=[old * values[0]])
-    return values
-
-
-def _uniform(time: Array, values: Array, spacing: float) -> BSpline | None:
+def uniform(time: Array, values: Array, spacing: float, rate: Rate | None = None) -> BSpline | None:
     """The least-squares spline with knots every so many samples; None where there is none."""
     n = len(time)
     # Uniform in samples, so that a gap in the clock leaves no piece without any.
     inner = np.interp(np.linspace(0, n - 1, int((n - 1) / spacing) + 1)[1:-1], np.arange(n), time)
     try:
-        return least_squares_spline(time, values, np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4]))
+        return least_squares_spline(
+            time, values, np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4]), rate
+        )
     except (ValueError, np.linalg.LinAlgError):
         return None  # a gap leaves a stretch between knots without samples
 
 
-def _score(time: Array, values: Array, spline: BSpline) -> float:
+def _score(time: Array, values: Array, spline: BSpline, rate: Rate | None) -> float:
     """Generalised cross-validation's mean square of what is left."""
     n = len(time)
-    return float(np.mean((values - spline(time)) ** 2)) / (1.0 - len(spline.c) / n) ** 2
+    left = float(np.mean((values - spline(time)) ** 2))
+    if rate is not None:
+        missed = (rate.values - spline(time, nu=1))[rate.trusted]
+        left += rate.weight**2 * float(np.sum(missed**2)) / n
+    return left / (1.0 - len(spline.c) / n) ** 2
 
 
-def _jumping(time: Array, values: Array, spline: BSpline) -> BSpline | None:
+def _jumping(time: Array, values: Array, spline: BSpline, rate: Rate | None) -> BSpline | None:
     """The spline with a double knot, at which its second derivative may jump, at every reversal.
 
     None where there is no reversal with room for one.
@@ -229,7 +221,7 @@ def _jumping(time: Array, values: Array, spline: BSpline) -> BSpline | None:
     nearest = np.minimum(np.abs(knots - at[following]), np.abs(knots - at[np.maximum(following - 1, 0)]))
     inner = np.sort(np.concatenate([knots[nearest > 0.5 * spacing], at, at]))
     try:
-        return least_squares_spline(time, values, np.concatenate([spline.t[:4], inner, spline.t[-4:]]))
+        return least_squares_spline(time, values, np.concatenate([spline.t[:4], inner, spline.t[-4:]]), rate)
     except (ValueError, np.linalg.LinAlgError):
         return None  # a gap leaves a stretch between knots without samples
 

@@ -17,6 +17,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.factors import explain, slope
 from hdsim.estimate.numbers import Interval
+from hdsim.estimate.offsets import DRIFT, ZEROS, offsets_of
 from hdsim.estimate.predict import Predictor
 from hdsim.estimate.records import Array, Mask
 from hdsim.estimate.refit import Refit
@@ -105,6 +106,40 @@ def one_way(bench: Bench) -> list[Problem]:
         for channel in bench.channels
         if channel.endswith("torque")
     ]
+
+
+def moving_zeros(bench: Bench, predictions: Sequence[Array]) -> list[Problem]:
+    """Torques of which little more than a constant of its own is left in each record.
+
+    Args:
+        bench: the measured series.
+        predictions: of the training records, by the final model.
+    """
+    found: list[Problem] = []
+    if bench.zeros == "record":
+        return found
+    together, apart = (
+        offsets_of(bench.series, bench.apart(predictions), zeros, drift=False) for zeros in ZEROS
+    )
+    for channel in bench.channels:
+        own = [k for k, s in enumerate(bench.series) if s.channel == channel and s.record < bench.training]
+        moved = {k: apart[k] - together[k] for k in own}
+        far = [k for k in own if abs(moved[k]) > DRIFT * bench.series[k].noise]
+        count = np.array([bench.series[k].train.sum() for k in own], dtype=float)
+        rest = bench.residuals(predictions)
+        left = np.array([np.sum(rest[k][bench.series[k].train] ** 2) for k in own])
+        floor = float(count @ np.array([bench.series[k].noise ** 2 for k in own]))
+        if far and count @ np.array([moved[k] ** 2 for k in own]) > CLOSED * (float(left.sum()) - floor):
+            words = ", ".join(
+                f"{moved[k]:+.3g} in {bench.predictors[bench.series[k].record].record.name}" for k in far[:3]
+            )
+            message = (
+                f"most of what is left is a constant of its own in each record ({words}): if the sensor was "
+                "zeroed between them, say --zeros record"
+            )
+            name = bench.predictors[bench.series[far[0]].record].record.name
+            found.append(Problem(name, channel, "zero", "warning", message))
+    return found
 
 
 def _scales(bench: Bench, before: list[Array]) -> list[Problem]:

@@ -19,6 +19,7 @@ def diagnose(
     holdout: tuple[Path, ...],
     out: Path,
     load: Any,
+    zeros: Any,
     force: bool,
     black_box: bool,
 ) -> int:
@@ -35,8 +36,9 @@ def diagnose(
     scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
         found = run(
-            records, scenario, holdout=held, load=load, force=force, black_box=black_box, on_step=tell
-        )
+            records, scenario, holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
+            on_step=tell,
+        )  # fmt: skip
         tell("finding the next experiment, writing the report")
         told = gather(found)
         report = save(found, model, out, told)

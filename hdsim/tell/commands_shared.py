@@ -38,6 +38,12 @@ def measured_options(command: F) -> F:
                 type=click.Choice(["scenario", "load_torque", "output_torque"]),
                 help="Where the load's torque comes from [load_torque when measured, else scenario].",
             ),
+            click.option(
+                "--zeros",
+                type=click.Choice(["campaign", "record"]),
+                default="campaign",
+                help="Whether torque sensors have one zero in all records, or one in each [campaign].",
+            ),
             click.option("--force", is_flag=True, help="Go on in spite of errors in the data."),
             click.option(
                 "--black-box",

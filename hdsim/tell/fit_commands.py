@@ -30,14 +30,15 @@ def fit(
     apart: tuple[str, ...],
     out: Path,
     load: Any,
+    zeros: Any,
     force: bool,
     black_box: bool,
 ) -> int:
     """Fit a scenario's numbers to measured records.
 
     Gives every number with its 95 % interval, or says what it cannot be told from; numbers are shared by all
-    records, sensors' offsets belong to each. PATH is a number's place in the scenario, such as
-    drive.friction.coulomb_nm.
+    records, and so are the zeros of torque sensors (--zeros). PATH is a number's place in the scenario, such
+    as drive.friction.coulomb_nm.
     """
     import hdsim
     from hdsim.estimate.outcome import result_of
@@ -47,8 +48,8 @@ def fit(
     scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
         found = hdsim.fit(
-            records, scenario, holdout=held, free=free, fix=fix, apart=apart, load=load, force=force,
-            black_box=black_box, on_step=tell,
+            records, scenario, holdout=held, free=free, fix=fix, apart=apart, load=load, zeros=zeros,
+            force=force, black_box=black_box, on_step=tell,
         )  # fmt: skip
         tell("writing the report")
         page = save_fit(found, model, out)

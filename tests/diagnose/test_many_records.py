@@ -79,9 +79,10 @@ class _Series:
 def test_a_torque_has_one_zero_and_an_angle_one_for_each_record():
     series = [_Series(r, c) for c in ("motor_torque", "output_angle") for r in (0, 1)]
     values = [np.full(10, v) for v in (1.0, 3.0, 1.0, 3.0)]
-    assert offsets_of(series, values, drift=False) == [2.0, 2.0, 1.0, 3.0]
+    assert offsets_of(series, values, "campaign", drift=False) == [2.0, 2.0, 1.0, 3.0]
+    assert offsets_of(series, values, "record", drift=False) == [1.0, 3.0, 1.0, 3.0]
     # A torque's zero may move by twice its noise between records.
-    assert offsets_of(series, values, drift=True) == pytest.approx([1.8, 2.2, 1.0, 3.0])
+    assert offsets_of(series, values, "campaign", drift=True) == pytest.approx([1.8, 2.2, 1.0, 3.0])
 
 
 def test_a_zero_is_weighed_as_the_fit_weighs_it():
@@ -91,4 +92,4 @@ def test_a_zero_is_weighed_as_the_fit_weighs_it():
     columns = np.concatenate([np.full(10, 1.0), np.full(40, 0.5)])
     whitened = np.concatenate([values[0], values[1] / 2.0])
     least_squares = columns @ whitened / (columns @ columns)
-    assert offsets_of(series, values, drift=False) == pytest.approx([least_squares] * 2)
+    assert offsets_of(series, values, "campaign", drift=False) == pytest.approx([least_squares] * 2)

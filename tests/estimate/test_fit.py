@@ -29,11 +29,15 @@ def test_a_bench_numbers_lie_in_their_intervals(tmp_path):
     assert inside >= 0.85 * told  # of 35 at 95 %, 30 or more have a chance of 99 %
 
 
-def test_records_share_numbers_and_have_offsets_of_their_own(tmp_path):
+def test_records_share_numbers_and_may_have_zeros_of_their_own(tmp_path):
     offsets = (0.2, -0.1)
     records = [record(k, 4.0, torque_offset=o, name=f"run {k}") for k, o in enumerate(offsets)]
     held = record(7, 3.0, torque_offset=0.05, name="held")
-    found = hdsim.fit(records, model(tmp_path), holdout=[held], fix=["motor_torque_gain"])
+    base, fixed = model(tmp_path), ["motor_torque_gain"]
+    together = hdsim.fit(records, base, holdout=[held], fix=fixed)
+    assert "--zeros record" in next(p.message for p in together.problems if p.kind == "zero")
+    found = hdsim.fit(records, base, holdout=[held], fix=fixed, zeros="record")
+    assert not [p for p in found.problems if p.kind == "zero"]
     assert [r.record for r in found.readings] == ["run 0", "run 1", "held"]
     assert [r.held for r in found.readings] == [False, False, True]
     for reading, offset in zip(found.readings, (*offsets, 0.05), strict=True):

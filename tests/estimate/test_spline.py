@@ -110,3 +110,18 @@ def test_a_filtered_rate_leaves_what_is_fast_and_real(order, corner):
     judged = smoothed(time, angle, motion=True, rate=(rate, np.ones(len(time), dtype=bool)))
     alone = acceleration_error(time, smoothed(time, angle, motion=True), acceleration)
     assert acceleration_error(time, judged, acceleration) < 1.1 * alone
+
+
+def test_samples_that_a_log_repeats_and_loses_stay_out_of_the_acceleration():
+    # Every 190 ms a sample is repeated; 9 ms later one is lost, and the angle has caught up.
+    time, angle, velocity, acceleration = swing(0, 0.0)
+    late = np.zeros(len(time), dtype=int)
+    for start in range(190, len(time) - 200, 190):
+        late[start : start + 9] = 1
+    seen = np.arange(len(time)) - late
+    true = angle - 4e-3 * np.random.default_rng(0).standard_normal(len(time))  # without the errors of `swing`
+    read = true[seen] + 2e-5 * np.random.default_rng(5).standard_normal(len(time))
+    rate = velocity[seen] + 0.02 * np.random.default_rng(6).standard_normal(len(time))
+    judged = smoothed(time, read, motion=True, rate=(rate, np.ones(len(time), dtype=bool)))
+    assert acceleration_error(time, smoothed(time, read, motion=True), acceleration) > 20.0
+    assert acceleration_error(time, judged, acceleration) < 0.1
