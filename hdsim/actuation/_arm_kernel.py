@@ -25,7 +25,7 @@ def arm_torque(inputs: Any, parameters: Any, own: int, columns: int, outputs: An
     pieces = int(parameters[2])
     lag = parameters[3]
     elapsed = inputs[TIME] - parameters[0]
-    piece = max(min(int(math.floor(elapsed / step)), pieces - 1), 0)
+    piece = max(min(math.floor(elapsed / step), pieces - 1), 0)
     u = elapsed - piece * step
     moving = 1.0
     if elapsed <= 0.0 or elapsed >= pieces * step:

@@ -1,9 +1,9 @@
-"""A robot arm as the load of one of its joints' drives: gravity, inertia and what the other joints' motions ask.
+"""A robot arm as the load of one of its joints' drives: gravity, inertia, and what the others' motions ask.
 
 The torque that the joint has to give along the motion of all joints is that of the rigid arm (recursive
-Newton-Euler, Featherstone 2008, Rigid Body Dynamics Algorithms, ch. 5, by Pinocchio). While the others move as
-they are told it is a trigonometric polynomial of the joint's own angle (``hdsim.actuation.urdf``), so nothing is
-taken along a nominal motion: the output may wind up and swing as it does.
+Newton-Euler, Featherstone 2008, Rigid Body Dynamics Algorithms, ch. 5, by Pinocchio). While the others move
+as they are told it is a trigonometric polynomial of the joint's own angle (``hdsim.actuation.urdf``), so
+nothing is taken along a nominal motion: the output may wind up and swing as it does.
 """
 
 from __future__ import annotations
@@ -57,11 +57,12 @@ class Payload(Parameters):
 class Arm(Parameters):
     """A robot arm of which the drive moves one joint.
 
-    The other joints move as ``joints`` says, or as a log has measured them; the output's angle is the joint's.
+    The other joints move as ``joints`` says, or as a log has measured them; the output's angle is the
+    joint's own.
     """
 
     file: Path
-    """URDF of the arm, its base fixed; a relative name counts from the folder of the scenario that names it."""
+    """URDF of the arm, its base fixed; a relative name counts from the folder of the scenario that has it."""
     joint: str
     """Revolute joint that the drive moves."""
     joints: dict[str, AngleTrajectory] = {}

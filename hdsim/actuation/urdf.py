@@ -58,7 +58,7 @@ class Chain:
         #: Place of each revolute joint in the vector of velocities, by name.
         self.joints: dict[str, int] = {
             name: joint.idx_v
-            for name, joint in zip(names, self._model.joints, strict=True)
+            for name, joint in zip(names[1:], list(self._model.joints)[1:], strict=True)
             if joint.nv == 1 and joint.shortname().startswith("JointModelR")
         }
 
@@ -101,9 +101,9 @@ class Chain:
     ) -> Array:
         """Terms of the torque that a joint has to give, along the motion of the others.
 
-        tau = c0 + c1 cos q + s1 sin q + c2 cos 2q + s2 sin 2q + M' q' + M q'', exact: the bodies beyond the joint turn
-        with it as a whole, so its own inertia M does not depend on its own angle, its weight and what
-        accelerations of the base ask of it turn once with q, what centrifugal forces ask twice.
+        tau = c0 + c1 cos q + s1 sin q + c2 cos 2q + s2 sin 2q + M' q' + M q'', exact: the bodies beyond the
+        joint turn with it as a whole, so its own inertia M does not depend on its own angle, its weight and
+        what accelerations of the base ask of it turn once with q, what centrifugal forces ask twice.
 
         Args:
             joint: the joint.

@@ -176,12 +176,16 @@ def _is_load(predictor: Predictor, series: Series) -> bool:
 
 
 def _load(predictor: Predictor, state: State) -> list[Array]:
-    """The known torque on the output as a list of at most one, shape (n,)."""
+    """The known torques on the output, shape (n,) each."""
+    found = []
+    if predictor.course is not None:
+        motion = np.array([predictor.motor_angle, predictor.motor_velocity, predictor.motor_acceleration])
+        found = [predictor.course.torque(state.load.arm, predictor.record.time, motion / predictor.ratio)]
     if predictor.load_torque is not None:
-        return [predictor.load_torque.values(predictor.record.time + LEAD_IN_S)[0]]
-    if state.load.torque is not None:
-        return [state.load.torque.values(predictor.record.time + predictor.record.begins_s)[0]]
-    return []
+        found.append(predictor.load_torque.values(predictor.record.time + LEAD_IN_S)[0])
+    elif state.load.torque is not None:
+        found.append(state.load.torque.values(predictor.record.time + predictor.record.begins_s)[0])
+    return found
 
 
 def _given(bench: Bench, series: Series) -> Array:

@@ -226,7 +226,7 @@ class Plant:
 
 
 def plant_parts(scenario: Scenario) -> list[Part]:
-    """Effects, gravity and an arm as it begins, and last the torques, so that their states follow all others."""
+    """Effects, gravity, an arm as it begins; last the torques, so that their states follow all others."""
     load = scenario.load
     gravity, arm = [load.gravity] if load.gravity else [], load.over(0.0)[0][1:]
     return [*scenario.effects.active().values(), *gravity, *arm, TorqueInputs()]

@@ -112,4 +112,4 @@ def test_on_a_real_joint_it_leaves_no_more_than_numpy_did(joint):
     base = hdsim.load_scenario(ROOT / "scenarios/bases/kinova_rigid.yaml")
     bench = bench_for([record_from(hdsim.import_recording(KINOVA, mapping))], [], base, "output_torque")
     gap, _ = gaps(bench, dict.fromkeys(("before", "refit", "after"), state_of(base)))
-    assert with_baselines(bench, state_of(base), gap)["motor_torque"].regression < 1.02 * REGRESSED_NM[joint]
+    assert with_baselines(bench, state_of(base), gap)["motor_torque"].regression < 1.05 * REGRESSED_NM[joint]
