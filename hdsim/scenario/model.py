@@ -102,7 +102,7 @@ class Scenario(Parameters):
         """A few lines on what the scenario describes."""
         drive, load, run = self.drive, self.load, self.run
         about = self.description.strip().split("\n")[0]
-        load_parts = [f"{load.inertia_kg_m2:g} kg m^2"]
+        load_parts = [f"{load.inertia_kg_m2:g} kg m^2"] if load.inertia_kg_m2 > 0 else []
         if load.torque is not None:
             load_parts.append("torque over time")
         if load.gravity is not None:

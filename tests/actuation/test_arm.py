@@ -73,7 +73,8 @@ def test_the_arm_of_a_run_moves_as_in_mujoco(tmp_path):
     (tmp_path / "run.yaml").write_text(
         f"""
 drive: {preset}load_coefficient: 0}}}}
-command: {{motor: {{type: torque, torque: {{type: sine, amplitude_nm: 0.6, frequency_hz: 1.5, phase_deg: 40}}}}}}
+command:
+  motor: {{type: torque, torque: {{type: sine, amplitude_nm: 0.6, frequency_hz: 1.5, phase_deg: 40}}}}
 load:
   inertia_kg_m2: 0.3
   arm:

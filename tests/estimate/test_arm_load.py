@@ -5,6 +5,7 @@ import pytest
 
 import hdsim
 from hdsim.cli import main
+from hdsim.diagnose.workflow import diagnose
 from hdsim.estimate.records import record_from
 
 pytest.importorskip("mujoco")
@@ -53,3 +54,14 @@ def test_measured_joints_are_kept_in_a_log(tmp_path):
     again = record_from(hdsim.open_log(tmp_path / "run.mcap"))
     for name, values in record_from(recording).joints.items():
         assert np.array_equal(again.joints[name], values)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_names_friction_and_not_what_the_neighbours_do(tmp_path):
+    data, mapping = plant.record(tmp_path, 1)
+    base = hdsim.load_scenario(plant.model(tmp_path, 1, payload=plant.MASS, coulomb=0.0))
+    found = diagnose([record_from(hdsim.import_recording(data, mapping))], base).verdict
+    assert len(found.effects) == 1
+    names = {found.effects[0].name, *found.effects[0].indistinguishable_from}
+    assert names <= {"input_coulomb_viscous", "load_side_friction", "stribeck_friction", "lugre_friction"}
+    assert found.gap["motor_torque"].after < 1.05 * 2e-3
