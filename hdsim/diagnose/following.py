@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from hdsim.diagnose.experiment import propose
+from hdsim.diagnose.experiment import TELLS, propose
 from hdsim.diagnose.workflow import Diagnosis
 from hdsim.errors import InputError
 from hdsim.estimate.fit import Fit, settled
@@ -62,7 +62,8 @@ def next_experiment(
         )
     except InputError:
         return None  # no experiment could be simulated: that is no reason to lose the verdict
-    proposal.scenario = str(out / name)
+    tells = proposal.separation >= TELLS
+    proposal.scenario = str(out / name) if tells else None
     diagnosis.verdict.next_experiment = proposal
     diagnosis.verdict.seconds["next"] = round(time.perf_counter() - started, 3)
-    return text
+    return text if tells else None

@@ -136,7 +136,7 @@ def test_a_motion_that_no_model_follows_is_told(tmp_path):
 def test_a_real_joint_under_a_base_that_lacks_friction_is_not_suspected(joint):
     base = ROOT / "scenarios" / "bases" / "kinova_rigid.yaml"
     mapping = ROOT / "scenarios" / "mappings" / f"kinova_joint_{joint}.yaml"
-    record = record_from(hdsim.import_recording(KINOVA, mapping), f"joint {joint}")
+    record = record_from(hdsim.import_recording(KINOVA / "opti_traj_testing1.csv", mapping), f"joint {joint}")
     assert suspected([record], hdsim.load_scenario(base), load="output_torque") == []
 
 
