@@ -111,9 +111,9 @@ def propose(
     )
     if chosen.separation < TELLS:
         sentence = (
-            f"None of the {len(ranked)} experiments that were tried would tell {apart} apart: the best of them, "
-            f"{chosen.experiment.title}, has an expected d' of {_said(chosen.separation)} (it takes {TELLS:g} to "
-            "be right five times of six)."
+            f"None of the {len(ranked)} experiments that were tried would tell {apart} apart: the best of "
+            f"them, {chosen.experiment.title}, has an expected d' of {_said(chosen.separation)} (it takes "
+            f"{TELLS:g} to be right five times of six)."
         )
     proposal = NextExperiment(
         sentence=sentence,

@@ -18,10 +18,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hdsim.errors import InputError, PhysicsError
+<<<<<<< HEAD
 from hdsim.estimate.known_load import Gravity, MeasuredTorque, arm_course
+=======
+from hdsim.estimate.knots import least_squares_spline
+>>>>>>> main
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import SlowPart, least_squares_spline, signal, smoothed
+from hdsim.estimate.spline import SlowPart, signal, smoothed
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 

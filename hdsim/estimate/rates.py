@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hdsim.estimate.knots import SPACINGS, Rate, uniform
 from hdsim.estimate.records import Array, Mask
-from hdsim.estimate.spline import SPACINGS, Rate, uniform
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

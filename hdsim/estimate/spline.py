@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdsim.errors import InputError
+from hdsim.estimate.knots import SPACINGS, Rate, least_squares_spline, uniform
 from hdsim.estimate.noise import quantisation_step
+from hdsim.estimate.rates import beside_rate
 from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
@@ -18,12 +19,8 @@ if TYPE_CHECKING:
 
 #: Time after the record for which its last piece goes on, s.
 TAIL_S = 0.02
-#: Samples between knots that are tried.
-SPACINGS = (1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 72.0, 108.0, 160.0, 240.0)
 #: What a spline may leave of a quantised reading in units of q / sqrt(12): a little noise comes on top.
 STEPS_ALLOW = 1.1
-#: Part of its own size that the other splines leave of a B-spline, squared, below which rounding decides.
-SINGULAR = 1e-12
 #: A carried load may bend once in this part of a wave-generator turn, or in this time, s.
 SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 
@@ -63,8 +60,6 @@ def smoothed(
         return np.asarray(exact.x), np.asarray(exact.c[::-1])
     beside: Rate | None = None
     if rate is not None:
-        from hdsim.estimate.rates import beside_rate
-
         chosen, beside = beside_rate(time, values, chosen, *rate)
     if motion:
         jumping = _jumping(time, values, chosen, beside)
@@ -76,75 +71,6 @@ def smoothed(
     keep = np.diff(pieces_of.x) > 0
     breaks = np.concatenate([pieces_of.x[:-1][keep], [time[-1]]])
     return breaks, np.asarray(pieces_of.c[::-1][:, keep])
-
-
-@dataclass(frozen=True)
-class Rate:
-    """A measured derivative of a channel.
-
-    Attributes:
-        values: shape (n,), unit of the channel a second.
-        trusted: shape (n,), samples that count.
-        weight: what an error of it weighs beside one of the channel, s.
-    """
-
-    values: Array
-    trusted: Mask
-    weight: float
-
-
-def least_squares_spline(time: Array, values: Array, knots: Array, rate: Rate | None = None) -> BSpline:
-    """The cubic spline of least squares, in a time that is linear in the samples.
-
-    The normal equations of B-splines are banded and well conditioned (de Boor, A Practical Guide to Splines,
-    ch. XIV); SciPy's ``make_lsq_spline`` takes a time that grows with samples times knots.
-
-    Args:
-        time: shape (n,), strictly increasing.
-        values: shape (n,).
-        knots: shape (c + 4,), increasing, four equal ones at either end.
-        rate: what its derivative is fitted to beside them.
-
-    Raises:
-        LinAlgError: a stretch between knots has no samples.
-        ValueError: a sample lies outside of the knots.
-    """
-    from scipy.interpolate import BSpline
-    from scipy.linalg import cho_solve_banded, cholesky_banded
-
-    c = len(knots) - 4
-    design = BSpline.design_matrix(time, knots, 3)
-    parts, at = design.data.reshape(-1, 4), design.indices.reshape(-1, 4)
-    if rate is not None:
-        slopes = rate.weight * _slopes(time, knots, at) * rate.trusted[:, None]
-        parts, at = np.vstack([parts, slopes]), np.vstack([at, at])
-        values = np.concatenate([values, np.where(rate.trusted, rate.weight * rate.values, 0.0)])
-    band, right = np.zeros((4, c)), np.zeros(c)
-    for i in range(4):
-        right += np.bincount(at[:, i], parts[:, i] * values, c)
-        for below in range(4 - i):
-            band[below] += np.bincount(at[:, i], parts[:, i] * parts[:, i + below], c)
-    factor = cholesky_banded(band, lower=True)
-    if np.any(factor[0] ** 2 <= SINGULAR * band[0]):
-        raise np.linalg.LinAlgError("a stretch between knots has no samples")
-    return BSpline(knots, cho_solve_banded((factor, True), right), 3)
-
-
-def _slopes(time: Array, knots: Array, at: Array) -> Array:
-    """Derivatives of the four cubic B-splines at each time, shape (n, 4): de Boor, ch. X, Eq. 8.
-
-    Args:
-        time: shape (n,).
-        knots: shape (c + 4,).
-        at: numbers of the B-splines, shape (n, 4).
-    """
-    from scipy.interpolate import BSpline
-
-    parabolas = BSpline.design_matrix(time, knots[1:-1], 2).data.reshape(-1, 3)
-    first = at[:, :1] + np.arange(1, 4)
-    heights = 3.0 * parabolas / (knots[first + 3] - knots[first])
-    none = np.zeros((len(time), 1))
-    return np.asarray(np.hstack([none, heights]) - np.hstack([heights, none]))
 
 
 def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[float, BSpline | None]:
@@ -173,19 +99,6 @@ def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[
     if coarse is not None and chosen is not None and len(coarse[1].c) < len(chosen.c):
         return coarse
     return best, chosen
-
-
-def uniform(time: Array, values: Array, spacing: float, rate: Rate | None = None) -> BSpline | None:
-    """The least-squares spline with knots every so many samples; None where there is none."""
-    n = len(time)
-    # Uniform in samples, so that a gap in the clock leaves no piece without any.
-    inner = np.interp(np.linspace(0, n - 1, int((n - 1) / spacing) + 1)[1:-1], np.arange(n), time)
-    try:
-        return least_squares_spline(
-            time, values, np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4]), rate
-        )
-    except (ValueError, np.linalg.LinAlgError):
-        return None  # a gap leaves a stretch between knots without samples
 
 
 def _score(time: Array, values: Array, spline: BSpline, rate: Rate | None) -> float:

@@ -7,7 +7,8 @@ import pytest
 from scipy.interpolate import PPoly, make_lsq_spline
 from scipy.signal import butter, lfilter
 
-from hdsim.estimate.spline import least_squares_spline, smoothed
+from hdsim.estimate.knots import least_squares_spline
+from hdsim.estimate.spline import smoothed
 
 
 def knots_for(time, spacing):
