@@ -18,11 +18,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hdsim.errors import InputError, PhysicsError
-<<<<<<< HEAD
-from hdsim.estimate.known_load import Gravity, MeasuredTorque, arm_course
-=======
 from hdsim.estimate.knots import least_squares_spline
->>>>>>> main
+from hdsim.estimate.known_load import Gravity, MeasuredTorque, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, signal, smoothed
