@@ -3,8 +3,8 @@
     python benchmarks/arm_joints.py [draws] [first seed]
 
 The arm is MuJoCo's (``mj_inverse`` at the motion of the output); the drive is written in NumPy: rigid, with
-known friction and one hidden thing: Coulomb friction that the model has not, a motor's ripple, a kinematic
-error (with its reaction on the motor, by virtual work), or nothing. Each line says what was hidden and what
+friction and one thing that its model has not: the Coulomb part of that, a motor's ripple, a kinematic error
+(with its reaction on the motor, by virtual work), or nothing. Each line says what was hidden and what
 was named; the last counts. Compared are motor torque and output angle.
 """
 
@@ -51,8 +51,8 @@ def record(joint: int, hidden: str, seed: int) -> Record:
     moved[2, :, joint] += slope * rate + bend * speed**2
     carried = plant.carried(moved)[:, joint]
     torque = carried * (1 / plant.RATIO + slope) + plant.ROTOR * rate + plant.VISCOUS * speed
-    coulomb = rng.uniform(0.02, 0.1) if hidden == "friction" else 0.0
-    torque = torque + (0.06 + coulomb) * np.tanh(speed / 0.5)
+    coulomb = rng.uniform(0.02, 0.1) if hidden == "friction" else plant.COULOMB
+    torque = torque + coulomb * np.tanh(speed / 0.5)
     if hidden == "ripple":
         order = rng.choice([1.0, 6.0, 12.0])
         torque = torque + rng.uniform(0.005, 0.03) * np.sin(order * angle + rng.uniform(0, 2 * np.pi))
@@ -75,7 +75,8 @@ def main() -> None:
         for joint in (1, 3):
             hidden = list(RIGHT)[(seed + joint // 2) % len(RIGHT)]
             with tempfile.TemporaryDirectory() as folder:
-                base = hdsim.load_scenario(plant.model(Path(folder), joint, plant.MASS))
+                coulomb = 0.0 if hidden == "friction" else plant.COULOMB
+                base = hdsim.load_scenario(plant.model(Path(folder), joint, plant.MASS, coulomb))
                 begun = time.perf_counter()
                 found = diagnose([record(joint, hidden, seed)], base).verdict
             named = [{effect.name, *effect.indistinguishable_from} for effect in found.effects]
