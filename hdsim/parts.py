@@ -7,7 +7,7 @@ Everything that an engineer can add to a drive (an effect, a load, a controller,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -181,6 +181,25 @@ class Part(Parameters):
         raise NotImplementedError
 
 
+@dataclass(frozen=True)
+class DriveSize:
+    """What the default numbers of effects depend on.
+
+    Args:
+        rated_torque_nm: at the output, N m.
+        ratio: motor angle / output angle.
+        stiffness_k1_nm_per_rad: first stiffness, N m/rad.
+        accuracy_rad: printed transmission accuracy, peak to peak, rad; 0 where nothing is printed.
+        hysteresis_loss_rad: printed hysteresis loss, rad; 0 where nothing is printed.
+    """
+
+    rated_torque_nm: float
+    ratio: float
+    stiffness_k1_nm_per_rad: float
+    accuracy_rad: float = 0.0
+    hysteresis_loss_rad: float = 0.0
+
+
 class Effect(Part):
     """A physical effect: one file in ``hdsim/effects``, off until a scenario names it.
 
@@ -192,6 +211,7 @@ class Effect(Part):
             a source's number is often another machine's.
         several: whether its fittings are errors of different things, one beside the other.
         adds_to: its fields that come on top of a number of the drive, by that number's path in the drive.
+        printed: whether catalogues print how large it is, so that ``effects: {set: catalogue}`` turns it on.
     """
 
     title: ClassVar[str]
@@ -200,3 +220,15 @@ class Effect(Part):
     number: ClassVar[Number] = Number(0.7, far=15.0, may_vanish=True)
     several: ClassVar[bool] = False
     adds_to: ClassVar[tuple[tuple[str, str], ...]] = ()
+    printed: ClassVar[bool] = False
+
+    @classmethod
+    def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:
+        """Default numbers for a drive, beyond those that grow with what their ``Plausible.of`` says.
+
+        Args:
+            given: fields that a scenario states.
+            size: the drive.
+            reference: the drive of the fields' own defaults.
+        """
+        return {}

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from hdsim.scenario import Scenario
+    from hdsim.study import RunMetrics
+
 Array = NDArray[np.float64]
 
 
@@ -107,6 +110,22 @@ class Recording:
         from hdsim.log import write_log
 
         return write_log(self, path)
+
+    def metrics(self, scenario: Scenario | None = None) -> RunMetrics:
+        """The run's numbers by name, such as ``settling_time``: value, unit, definition and its source.
+
+        The same numbers as in ``hdsim run``, ``hdsim budget`` and ``hdsim study``; each is computed when it
+        is first asked for.
+
+        Args:
+            scenario: what was run; what the recording carries when None.
+
+        Raises:
+            InputError: the recording carries no scenario and none is given.
+        """
+        from hdsim.study import metrics_of
+
+        return metrics_of(self, scenario)
 
     def plot(self, **options: Any) -> Figure:
         """Draw the one-page figure of the run."""

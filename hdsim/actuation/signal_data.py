@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -120,6 +120,48 @@ def joined(moves: Sequence[Move], initial: float = 0.0) -> Move:
     return Move((*segments,), time, initial + first, value)
 
 
+#: Points of a wave at which its size is looked at.
+_POINTS = 2001
+
+
+def _stacked(segment: Segment, used: Any, lengths: Array) -> Iterator[tuple[Any, Any]]:
+    """Records and lengths of a segment's pieces: cubics all at once, shape (n, 1), others one by one."""
+    import numpy as np
+
+    if segment.kind == law.CUBIC:
+        if len(used):
+            rows = np.array([segment.rows[k] for k in used]).T[:, :, None]
+            yield rows, lengths[used][:, None]
+        return
+    for k in used:
+        yield segment.rows[k], float(lengths[k])
+
+
+def _evaluated(kind: int, row: Any, t: Array) -> Array:
+    """Value and two derivatives of a piece, as in ``_signal_kernel``: shape (3, ...)."""
+    import numpy as np
+
+    if kind == law.CUBIC:
+        c0, c1, c2, c3 = row
+        return np.array(
+            [c0 + t * (c1 + t * (c2 + t * c3)), c1 + t * (2 * c2 + t * 3 * c3), 2 * c2 + 6 * c3 * t]
+        )
+    offset, amplitude = row[0], row[1]
+    if kind == law.SINES:
+        waves = np.array(row[2:]).reshape(-1, 3)
+        sines = waves[:, 0, None] * np.exp(1j * (waves[:, 1, None] * t + waves[:, 2, None]))
+        rates = 1j * waves[:, 1, None]
+        return np.array(
+            [offset + sines.sum(0).imag, (rates * sines).sum(0).imag, (rates**2 * sines).sum(0).imag]
+        )
+    if kind == law.TRIANGLE:
+        return np.array([offset + amplitude + 0 * t, 4 * row[2] * amplitude + 0 * t, 0 * t])
+    rate = row[3]
+    omega = row[2] + rate * t if kind == law.LINEAR_CHIRP else row[2] * np.exp(rate * t)
+    # The envelope of a sweep: a wave's own phase hardly matters to its largest value.
+    return np.array([abs(offset) + abs(amplitude) + 0 * t, amplitude * omega, amplitude * omega**2])
+
+
 class SignalData:
     """A signal made ready to run: what ``Builder.signal`` takes.
 
@@ -142,6 +184,33 @@ class SignalData:
         move = self.move
         segments = tuple(segment.scaled(factor) for segment in move.segments)
         return SignalData(Move(segments, move.duration, factor * move.initial, factor * move.final))
+
+    def largest(self, duration: float) -> tuple[float, float, float]:
+        """Largest size of value, first and second derivative up to a time, without compiled code.
+
+        Args:
+            duration: time, s.
+
+        Returns:
+            SI units. Exact for holds, steps, ramps and trapezoids; of waves the largest of many points.
+        """
+        import numpy as np
+
+        starts = [start for segment in self.move.segments for start in segment.starts]
+        found = np.array([abs(self.move.initial), 0.0, 0.0])
+        index = 0
+        for segment in self.move.segments:
+            n = len(segment.starts)
+            stops = np.minimum(np.array([*starts, np.inf])[index + 1 : index + n + 1], duration)
+            lengths = stops - np.asarray(segment.starts)
+            index += n
+            used = np.flatnonzero(lengths >= 0.0)
+            points = 5 if segment.kind == law.CUBIC else _POINTS
+            for rows, length in _stacked(segment, used, lengths):
+                t = np.linspace(0.0, 1.0, points) * length
+                sizes = np.abs(_evaluated(segment.kind, rows, t))
+                found = np.maximum(found, sizes.reshape(3, -1).max(axis=1))
+        return float(found[0]), float(found[1]), float(found[2])
 
     def pack(self) -> Array:
         """Parameters of the kernel, float64."""

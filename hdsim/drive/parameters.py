@@ -158,6 +158,8 @@ class ToothedMesh(Parameters):
     """Standard deviation of the teeth's pitch error, m."""
     half_gap_m: float | None = Field(None, ge=0)
     """The same half-gap for every tooth, m; given instead of the Weierstrass-Mandelbrot backlash."""
+    gap_factor: float = Field(1.0, ge=0, le=1000)
+    """Factor on every half-gap: 2 is the same flanks with the backlash doubled."""
     gap_along_flank: bool = False
     """Let the gap follow the flank's profile as the contact point slides, instead of each tooth's average."""
     gap_smoothing_m: float = Field(0.0, ge=0, le=1e-5)

@@ -157,9 +157,9 @@ class Teeth:
         header = self._header
         if mesh.half_gap_m is not None or not mesh.gap_along_flank:
             if mesh.half_gap_m is not None:
-                self.half_gaps_m = np.full(self.count, mesh.half_gap_m)
+                self.half_gaps_m = np.full(self.count, mesh.gap_factor * mesh.half_gap_m)
             else:
-                self.half_gaps_m = mesh.flanks.half_gaps(self.count, seed)
+                self.half_gaps_m = mesh.gap_factor * mesh.flanks.half_gaps(self.count, seed)
             cells = np.zeros((self.count, 1, 4))
             cells[:, 0, 0] = self.half_gaps_m
             if isinstance(mesh.engagement, WindowEngagement) and mesh.gap_smoothing_m == 0.0:
@@ -168,7 +168,7 @@ class Teeth:
             from scipy.interpolate import PchipInterpolator
 
             nodes = np.linspace(-np.pi / 2, np.pi / 2, FLANK_CELLS + 1)
-            gaps = mesh.flanks.sliding_half_gaps(self.count, FLANK_CELLS + 1, seed)
+            gaps = mesh.gap_factor * mesh.flanks.sliding_half_gaps(self.count, FLANK_CELLS + 1, seed)
             # Half a turn on, the tooth meets the other lobe at the same place of its flank.
             gaps[:, 0] = gaps[:, -1] = 0.5 * (gaps[:, 0] + gaps[:, -1])
             # Monotone pieces: a spline would overshoot to negative gaps.

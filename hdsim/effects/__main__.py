@@ -38,6 +38,12 @@ dissipative and every spring stores what it takes: the tests check it for each e
 its derivatives too. sign(w) of speed-dependent friction is `tanh(w / smoothing velocity)`: below that speed
 the drive creeps instead of sticking; LuGre friction and hysteresis have states instead and stick.
 
+The defaults below are those of size 20 at ratio 100. For another drive they grow with what *usually* is a
+multiple of; kinematic error and torsional hysteresis follow the printed accuracy and hysteresis loss of the
+preset. `effects: {set: catalogue}` turns these two on, so that a preset shows what its catalogue prints; an
+effect named beside it has its own numbers, `null` turns it off. `hdsim check` prints the numbers in use, and
+the log keeps them.
+
 *Usually* is where an engineer expects a number before a measurement, and no bound; T_N is the rated torque,
 K1 the drive's first stiffness. What no number can be, the field refuses.
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
 
 from hdsim.effects._fitting import Fitting, Harmonic, Periodic, Plausible
 from hdsim.effects._kernels import ARCMIN, Turn, factors, harmonics
-from hdsim.parts import Builder, Effect, Parameters, Signature
+from hdsim.parts import Builder, DriveSize, Effect, Parameters, Signature
 
 
 class ErrorComponent(Parameters):
@@ -61,7 +62,8 @@ class KinematicError(Effect):
     the model would create energy (virtual work). With the circular spline fixed the orders per
     wave-generator turn of an order-2 ``relative_turn`` component are 2 z_c/z_f (2.02 at ratio 100), and an
     order-1 ``output_turn`` component is 1/ratio (0.01). The default components sum to the catalogue's
-    transmission accuracy of about 1 arcmin peak to peak.
+    transmission accuracy of about 1 arcmin peak to peak; they are those of size 20 at ratio 100, printed with
+    0.8 arcmin, and grow with the printed accuracy of another preset.
     """
 
     title: ClassVar[str] = "kinematic error"
@@ -89,6 +91,7 @@ class KinematicError(Effect):
         },
     )
     several: ClassVar[bool] = True
+    printed: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (
@@ -129,6 +132,19 @@ class KinematicError(Effect):
 
     components: tuple[ErrorComponent, ...] = Field(default_factory=_default_components, min_length=1)
     """The harmonics."""
+
+    @classmethod
+    def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:
+        """The default components, as large as the printed accuracy wants them."""
+        larger = (size.accuracy_rad or reference.accuracy_rad) / reference.accuracy_rad
+        if larger == 1.0:
+            return {}
+        return {
+            "components": [
+                {"order": c.order, "amplitude_arcmin": larger * (c.amplitude_arcmin or 0.0), "per": c.per}
+                for c in _default_components()
+            ]
+        }
 
     def contribute(self, build: Builder) -> None:
         """Add the harmonics to the mesh twist."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
-from hdsim.parts import Builder, Effect, Signature, State
+from hdsim.parts import Builder, DriveSize, Effect, Signature, State
 
 
 @element
@@ -76,6 +77,17 @@ class TorsionalHysteresisDuhem(Effect):
         float | None, Plausible(0.02, 0.6, "within the wind-up of the first stiffness")
     ] = Field(None, gt=0)
     """Twist 1/alpha of a branch, mrad; where it is given, A is the saturation torque over it."""
+
+    @classmethod
+    def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:
+        """Saturation torque from the printed hysteresis loss and K1, stiffness A from K1."""
+        wider = (size.hysteresis_loss_rad or reference.hysteresis_loss_rad) / reference.hysteresis_loss_rad
+        stiffer = size.stiffness_k1_nm_per_rad / reference.stiffness_k1_nm_per_rad
+        fields = cls.model_fields
+        return {
+            "saturation_torque_nm": fields["saturation_torque_nm"].default * wider * stiffer,
+            "stiffness_nm_per_rad": fields["stiffness_nm_per_rad"].default * stiffer,
+        }
 
     def contribute(self, build: Builder) -> None:
         """Add the hysteresis torque parallel to the torsion spring."""

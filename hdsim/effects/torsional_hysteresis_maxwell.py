@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
@@ -10,7 +11,7 @@ from pydantic import Field, model_validator
 from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
 from hdsim.number import FIXED
-from hdsim.parts import Builder, Effect, Parameters, Signature, State
+from hdsim.parts import Builder, DriveSize, Effect, Parameters, Signature, State
 
 
 @element
@@ -65,6 +66,10 @@ class TorsionalHysteresisMaxwell(Effect):
     Without ``elements``, ``slip_torque_nm`` is shared equally by elements that slip at ``slip_twists_mrad``
     times ``slip_twist_scale``.
     The elements stiffen the drive on reversal by sum k_i; a catalogue stiffness contains that already.
+
+    The defaults are those of size 20. The loop's width at zero torque is about 2 W/K1, and a catalogue prints
+    that angle, the hysteresis loss h (1 arcmin for every size): so for another drive W = 2 N m (h/1 arcmin)
+    K1/(16 kN m/rad), and the twists at which elements slip grow with h.
     """
 
     title: ClassVar[str] = "torsional hysteresis (Maxwell slip)"
@@ -86,6 +91,7 @@ class TorsionalHysteresisMaxwell(Effect):
             "lugre_friction": "absent with the wave generator locked",
         },
     )
+    printed: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Amplitude({"slip_torque_nm": 1.0}),),
@@ -118,6 +124,16 @@ class TorsionalHysteresisMaxwell(Effect):
         if min(self.slip_twists_mrad) <= 0:
             raise ValueError(f"slip_twists_mrad must be above 0, found {min(self.slip_twists_mrad)}")
         return self
+
+    @classmethod
+    def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:
+        """Slip torque and twists from the printed hysteresis loss and K1."""
+        if given.get("elements") is not None:
+            return {}
+        wider = (size.hysteresis_loss_rad or reference.hysteresis_loss_rad) / reference.hysteresis_loss_rad
+        stiffer = size.stiffness_k1_nm_per_rad / reference.stiffness_k1_nm_per_rad
+        torque = cls.model_fields["slip_torque_nm"].default
+        return {"slip_torque_nm": torque * wider * stiffer, "slip_twist_scale": wider}
 
     def slip_elements(self) -> tuple[SlipElement, ...]:
         """The elements in use, given or shared out."""

@@ -70,7 +70,6 @@ def _cost(drive: Mapping[str, Any], effects: Mapping[str, Any] | None = None) ->
     from hdsim.contact.law import ValidityWarning
     from hdsim.contact.majumdar_bhushan import MajumdarBhushan
     from hdsim.simulation.simulate import simulate
-    from hdsim.study.known_metrics import measure
     from hdsim.study.known_procedures import find_procedure
     from hdsim.study.metrics.teeth import contact_law
 
@@ -79,7 +78,8 @@ def _cost(drive: Mapping[str, Any], effects: Mapping[str, Any] | None = None) ->
         # Over the paper's range of D and G the asperities often do not fit on the flank.
         warnings.simplefilter("ignore", ValidityWarning)
         scenario = find_procedure("torsion").build(drive, effects=effects)
-        found = measure(names, simulate(scenario), scenario)
+        numbers = simulate(scenario).metrics(scenario)
+        found = {name: numbers[name].value for name in names}
         law = contact_law(scenario)
     if isinstance(law, MajumdarBhushan) and law.all_plastic_force_n > paper.RATED_FORCE_N:
         found |= dict.fromkeys(names[-2:], math.nan)
@@ -121,19 +121,17 @@ def positioning() -> Budget:
     scenario = find_procedure("positioning").build(
         _drive({}), effects=_EFFECTS, cycles=2, targets=4, load_torque_nm=LOAD_NM, run={"rtol": 1e-4}
     )
-    return error_budget(scenario)
+    return error_budget(scenario, shares=False)
 
 
 @cache
 def kinematic_error() -> float:
     """Transmission error over one output turn without load, peak to peak, arcsec."""
     from hdsim.simulation.simulate import simulate
-    from hdsim.study.known_metrics import measure
     from hdsim.study.known_procedures import find_procedure
 
-    name = "transmission_accuracy"
     scenario = find_procedure("transmission_error").build(_drive({}), effects=_EFFECTS, run={"rtol": 1e-4})
-    return measure([name], simulate(scenario), scenario)[name]
+    return simulate(scenario).metrics(scenario)["transmission_accuracy"].value
 
 
 def wind_up() -> tuple[float, float]:

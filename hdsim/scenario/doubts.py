@@ -5,13 +5,20 @@ from __future__ import annotations
 from operator import attrgetter
 from typing import TYPE_CHECKING
 
+from hdsim.scenario.demands import demands
+
 if TYPE_CHECKING:
     from hdsim.scenario.model import Scenario
 
 
 def doubts(scenario: Scenario) -> list[str]:
     """Warnings about a scenario, each one line: field, what was found, what to do."""
-    return [*_unread_sensors(scenario), *_coarse_windows(scenario), *_double_friction(scenario)]
+    return [
+        *demands(scenario),
+        *_unread_sensors(scenario),
+        *_coarse_windows(scenario),
+        *_double_friction(scenario),
+    ]
 
 
 def _unread_sensors(scenario: Scenario) -> list[str]:

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
-from pydantic import BaseModel, Field, create_model, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from hdsim.actuation.command import Command
 from hdsim.actuation.loads import Load
 from hdsim.drive.parameters import Drive
+from hdsim.drive.presets import catalogue_figures, preset_names
 from hdsim.effects import catalogue
-from hdsim.parts import Effect, Parameters
+from hdsim.effects._sizes import sized_defaults
+from hdsim.parts import DriveSize, Effect, Parameters
 from hdsim.scenario.extends import read
-from hdsim.scenario.settings import LiveOptions, LogOptions, Run
+from hdsim.scenario.reader import flatten, parse
+from hdsim.scenario.settings import Evaluation, LiveOptions, LogOptions, Run
 from hdsim.scenario.validation import build
 from hdsim.scenario.writer import to_yaml
 
@@ -21,11 +34,19 @@ from hdsim.scenario.writer import to_yaml
 class EffectChoice(Parameters):
     """Physical effects by name; one that is not named is off."""
 
+    set: Literal["catalogue"] | None = None
+    """``catalogue``: kinematic error and torsional hysteresis as large as the preset's catalogue says; an
+    effect that is named beside it has its own numbers, and null turns it off."""
+
+    @model_serializer(mode="wrap")
+    def _on_alone(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Effects that are on: null is written where it turns one of a set off, and the set is resolved."""
+        return {name: data for name, data in dump(self).items() if data is not None}
+
     def active(self) -> dict[str, Effect]:
         """The effects that are on, by name."""
-        return {
-            name: effect for name in type(self).model_fields if (effect := getattr(self, name)) is not None
-        }
+        found = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: effect for name, effect in found.items() if isinstance(effect, Effect)}
 
 
 def _effects() -> type[EffectChoice]:
@@ -42,6 +63,18 @@ if TYPE_CHECKING:
 else:
     Effects = _effects()
     Effects.__doc__ = EffectChoice.__doc__
+
+
+def size_of(drive: Drive) -> DriveSize:
+    """What the default numbers of effects depend on."""
+    figures = catalogue_figures(drive.preset) if drive.preset in preset_names() else None
+    return DriveSize(
+        drive.rated_torque_nm,
+        abs(drive.ratio),
+        drive.torsion.stiffness_k1_nm_per_rad,
+        figures.accuracy.value if figures else 0.0,
+        figures.hysteresis_loss.value if figures else 0.0,
+    )
 
 
 class Scenario(Parameters):
@@ -61,10 +94,35 @@ class Scenario(Parameters):
     """What hangs on the output."""
     run: Run
     """How the model is integrated and sampled."""
+    evaluation: Evaluation = Evaluation()
+    """What the run's numbers are held against."""
     log: LogOptions = LogOptions()
     """What the log contains."""
     live: LiveOptions = LiveOptions()
     """What may be changed while it runs, for ``hdsim run --live``."""
+
+    @field_validator("effects", mode="before")
+    @classmethod
+    def _fit_to_drive(cls, given: Any, info: ValidationInfo) -> Any:
+        """Fill what the effects leave open with what fits the drive, so that the scenario states it."""
+        drive = info.data.get("drive")
+        if drive is None or not isinstance(given, dict):
+            return given
+        chosen = dict(given)
+        if chosen.get("set") == "catalogue":
+            if drive.preset not in preset_names():
+                raise ValueError(
+                    "set: catalogue needs a drive with a preset, whose catalogue it follows; name the "
+                    "effects with their numbers instead"
+                )
+            del chosen["set"]
+            chosen = {name: {} for name, effect in catalogue().items() if effect.printed} | chosen
+        size = size_of(drive)
+        for name, effect in catalogue().items():
+            stated = chosen.get(name)
+            if isinstance(stated, dict):
+                chosen[name] = stated | sized_defaults(effect, stated, size)
+        return chosen
 
     @model_validator(mode="after")
     def _live_numbers(self) -> Scenario:
@@ -91,16 +149,35 @@ class Scenario(Parameters):
             source.data["name"] = Path(path).stem[:200]
         return build(source, cls)
 
+    @classmethod
+    def from_text(cls, text: str, name: str = "scenario.yaml") -> Scenario:
+        """The scenario that ``to_yaml`` wrote, as every log keeps it.
+
+        Args:
+            text: YAML that extends nothing.
+            name: where errors say that it stands.
+
+        Raises:
+            hdsim.scenario.ScenarioError: with one line for every mistake.
+        """
+        return build(flatten(parse(text, name)), cls)
+
     def to_yaml(self) -> str:
         """The whole scenario as YAML: defaults, presets and extended files resolved, paths absolute."""
         data = self.model_dump(mode="json")
-        for section in ("effects", "command", "load", "run", "log", "live"):
+        for section in ("effects", "command", "load", "run", "evaluation", "log", "live"):
             data[section] = _without_unset(getattr(self, section), data[section])
         return to_yaml(data)
 
     def summary(self) -> str:
         """A few lines on what the scenario describes."""
         drive, load, run = self.drive, self.load, self.run
+        torsion = drive.torsion
+        stiffness = (
+            torsion.stiffness_k1_nm_per_rad,
+            torsion.stiffness_k2_nm_per_rad,
+            torsion.stiffness_k3_nm_per_rad,
+        )
         about = self.description.strip().split("\n")[0]
         load_parts = [f"{load.inertia_kg_m2:g} kg m^2"] if load.inertia_kg_m2 > 0 else []
         if load.torque is not None:
@@ -113,14 +190,40 @@ class Scenario(Parameters):
         lines = {
             "scenario": f"{self.name}: {about}" if about else self.name,
             "drive": f"{drive.preset or 'own numbers'}, ratio {drive.ratio:g}, "
-            f"rated torque {drive.rated_torque_nm:g} N m, {drive.mesh.model} mesh",
-            "effects": ", ".join(self.effects.active()) or "none",
+            f"rated torque {drive.rated_torque_nm:g} N m, {drive.mesh.model} mesh\n            "
+            f"K1, K2, K3 {', '.join(f'{k:.4g}' for k in stiffness)} N m/rad; motor and wave generator "
+            f"{drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2:.3g} kg m^2",
+            "effects": "\n            ".join(self._effects_told()) or "none",
             "command": f"motor {self.command.motor.type}, output {self.command.output.type}",
             "load": ", ".join(load_parts),
             "run": f"{run.duration_s:g} s, method {run.method}, rtol {run.rtol:g}, {samples} samples, "
             f"seed {run.seed}",
         }
         return "\n".join(f"  {title:<9} {line}" for title, line in lines.items())
+
+    def _effects_told(self) -> list[str]:
+        """The effects that are on with the numbers in use, those that fit the drive by default among them."""
+        lines: list[str] = []
+        for name, effect in self.effects.active().items():
+            text = f"{name}: {_short(effect)}" if _short(effect) else name
+            lines += textwrap.wrap(text, 88, subsequent_indent="  ")
+        return lines
+
+
+def _short(value: Any) -> str:
+    """Numbers of a section in one line, without what is not set or nothing; long lists are cut."""
+    if isinstance(value, BaseModel):
+        fields = type(value).model_fields
+        told = (
+            (name, _short(one))
+            for name, one in value
+            if one is not None and not (one == 0 and fields[name].default == 0)
+        )
+        return ", ".join(f"{name} {one}".strip() for name, one in told if one)
+    if isinstance(value, list | tuple):
+        items = [_short(one) for one in value[:6]] + (["..."] if len(value) > 6 else [])
+        return "[" + "; ".join(items) + "]" if items else ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _without_unset(model: BaseModel, data: dict[str, Any]) -> dict[str, Any]:

@@ -80,7 +80,7 @@ def read_node(path: Path) -> Node:
             the plain YAML described above.
     """
     text = _read_text(path)
-    return _build(text, str(path))
+    return parse(text, str(path))
 
 
 def fail(mark: Mark, text: str, path: KeyPath = ()) -> ScenarioError:
@@ -169,7 +169,7 @@ def _syntax_error(error: Exception, text: str, file: str) -> ScenarioError:
     return fail(Mark(file, number + 1), f"found {shorten(ascii(complaint)[1:-1], 160)}, expected valid YAML")
 
 
-def _build(text: str, file: str) -> Node:
+def parse(text: str, file: str) -> Node:
     """Build the tree from the parser's events; a loop, so that no nesting exhausts Python's stack."""
     from ruamel.yaml import events
 

@@ -55,6 +55,14 @@ class Run(Parameters):
         return self
 
 
+class Evaluation(Parameters):
+    """What the numbers that are taken of a run are held against."""
+
+    settling_band_arcsec: float = Field(30.0, gt=0, le=1e6)
+    """Half-width of the band about its target in which the output counts as settled, arcsec. The default is
+    half an arcmin, half of what catalogues allow a gear."""
+
+
 class LogOptions(Parameters):
     """What the log of a run contains besides the state."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
+    from hdsim.recording import Recording
+    from hdsim.scenario import Scenario
     from hdsim.simulation.run import Run
 
 
@@ -71,6 +74,9 @@ def run(
         if session is not None:
             session.close()
     tell(done, loaded.run.duration_s)
+    recording = hdsim.open_log(path)
+    if len(recording.time) > 1:
+        tell_numbers(recording, loaded)
     click.echo(f"log      {path}")
     if verify:
         from hdsim.log import verify_log
@@ -80,7 +86,7 @@ def run(
     if plot:
         picture = path.with_suffix(".png")
         try:
-            hdsim.open_log(path).plot().savefig(picture)
+            recording.plot().savefig(picture)
             click.echo(f"picture  {picture}")
         except InputError as error:
             click.echo(f"picture  none: {error}")
@@ -102,6 +108,43 @@ def tell(run: Run, duration_s: float) -> None:
         click.echo(
             f"error: energy from nothing: {audit.gave_back} gave back {audit.given_back:.2e} J", err=True
         )
+
+
+def tell_numbers(recording: Recording, scenario: Scenario) -> None:
+    """Print the run's numbers beside what the drive may carry, and what happened that should not."""
+    from rich.table import Table
+
+    from hdsim.console import console
+    from hdsim.study.engineering import engineering_rows, told_events
+
+    table = Table()
+    table.add_column("quantity")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    table.add_column("limit", justify="right")
+    table.add_column("held against")
+    table.add_column("share", justify="right")
+    last = ""
+    for row in engineering_rows(recording.metrics(scenario)):
+        if last and row.section != last:
+            table.add_section()
+        last = row.section
+        value, unit = row.measured.value, row.measured.unit
+        told = row.limit and not row.least and math.isfinite(value)
+        share = f"{value / row.limit:.0%}" if row.limit and told else ""
+        bad = row.holds is False
+        table.add_row(
+            row.name.replace("_", " "),
+            "never" if math.isinf(value) else f"{value:.4g}",
+            unit,
+            "" if row.limit is None else f"{'≥' if row.least else '≤'} {row.limit:.5g}",
+            row.of,
+            share,
+            style="bold red" if bad else None,
+        )
+    console().print(table)
+    for event in told_events(recording.events):
+        click.echo(f"{event.level}: {event.time:.4g} s, {event.source}: {event.message}", err=True)
 
 
 class progress:  # noqa: N801 - used as a function

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hdsim.drive.ratings import ratings_of_preset
 from hdsim.recording import Event
+from hdsim.simulation.limit_cycle import RestWatch
 from hdsim.simulation.limits import Bearing, speed_watches, torque_watches
 from hdsim.simulation.quota import Quota
 from hdsim.simulation.watches import CROSSED, Flanks, Watch
@@ -49,6 +50,7 @@ class EventDetector:
     _steps: int = 0
     _rejected: int = 0
     _told_friction: bool = False
+    _rests: RestWatch = field(default_factory=RestWatch)
 
     def __post_init__(self) -> None:
         rated = self.model.rated_torque_nm
@@ -177,7 +179,8 @@ class EventDetector:
             time: time that was reached, s.
             failure: why the run stopped early, or None.
         """
-        found = [event for quota in self._quotas.values() for event in quota.finish(time)]
+        found = self._limited(list(self._rests.end()), time)
+        found += [event for quota in self._quotas.values() for event in quota.finish(time)]
         if self._bearing is not None:
             found += self._bearing.told(time)
         if failure is None:
@@ -202,7 +205,10 @@ class EventDetector:
             return []
         if times[0] == times[1]:
             times, angles, moves = times[1:], angles[1:], moves[1:]
-        found = []
+        found: list[Event] = []
+        if "tracking_error" in state:
+            told = slice(len(time) - len(moves), None)
+            found += self._rests.feed(time[told], state["tracking_error"][told], ~moves)
         for k in np.flatnonzero(
             np.diff(moves.astype(int), prepend=-1 if self._moving is None else int(self._moving))
         ):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,7 +47,7 @@ def bench(
             click.echo(f"{one.name}: {one.title} ({one.source})")
             click.echo(f"    {', '.join(one.metrics)}")
         return 0
-    name, section, effects, run, lines = _drive(drive)
+    name, section, effects, run, lines = benched(drive)
     if seed is not None:
         run["seed"] = seed
     folder = Path("bench") / name if output is None else output
@@ -130,7 +131,7 @@ def presets(name: str | None) -> None:
     console().print(table)
 
 
-def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any], dict[str, Line]]:
+def benched(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any], dict[str, Line]]:
     """Name, sections ``drive`` and ``effects``, fields of ``run``, and the catalogue's lines.
 
     Raises:
@@ -138,11 +139,11 @@ def _drive(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, A
     """
     from hdsim.drive.presets import catalogue_figures, preset_names
     from hdsim.errors import InputError
-    from hdsim.study.bench.report import catalogue_lines, default_effects
+    from hdsim.study.bench.report import CATALOGUE_EFFECTS, catalogue_lines
 
     if given in preset_names():
         section = {"preset": given}
-        return given, section, default_effects(section), {}, catalogue_lines(catalogue_figures(given))
+        return given, section, dict(CATALOGUE_EFFECTS), {}, catalogue_lines(catalogue_figures(given))
     path = Path(given)
     if not path.exists():
         try:
@@ -181,7 +182,7 @@ def _print(rows: list[Row], title: str) -> None:
         table.add_row(
             row.procedure if row.procedure != last else "",
             row.metric,
-            row.problem or f"{row.value:.4g}",
+            row.problem or ("never" if math.isinf(row.value) else f"{row.value:.4g}"),
             "" if row.line is None else str(row.line),
             row.unit,
             verdict,

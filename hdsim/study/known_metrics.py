@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
 import hdsim.study.metrics  # noqa: F401 - importing registers
 from hdsim.study.registry import Metric, named, registered_metrics
-
-if TYPE_CHECKING:
-    from hdsim.recording import Recording
-    from hdsim.scenario import Scenario
 
 
 def metrics() -> dict[str, Metric]:
@@ -25,12 +18,3 @@ def find_metric(name: str) -> Metric:
         InputError: there is none; the message names the nearest.
     """
     return named("metric", name, metrics())
-
-
-def measure(names: Sequence[str], recording: Recording, scenario: Scenario) -> dict[str, float]:
-    """Several metrics of one run, by name.
-
-    Raises:
-        InputError: an unknown metric, or one that the run does not contain.
-    """
-    return {name: find_metric(name)(recording, scenario) for name in names}

@@ -22,11 +22,11 @@ _PRESET = "csg-20-100"
 
 @cache
 def _bench(procedure: str) -> BenchRun:
-    from hdsim.study.bench.report import default_effects, run_procedure
+    from hdsim.study.bench.report import CATALOGUE_EFFECTS, run_procedure
     from hdsim.study.known_procedures import find_procedure
 
     drive = {"preset": _PRESET}
-    return run_procedure(find_procedure(procedure), drive, effects=default_effects(drive))[0]
+    return run_procedure(find_procedure(procedure), drive, effects=CATALOGUE_EFFECTS)[0]
 
 
 _LINES = {

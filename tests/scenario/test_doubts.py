@@ -60,6 +60,47 @@ def test_friction_that_counts_twice(name: str) -> None:
     assert told({name: {}}, drive={"preset": "csg-20-100", "friction": {"coulomb_nm": 0.0}}) == []
 
 
+MOVE: dict[str, Any] = {
+    "type": "position",
+    "at": "output",
+    "trajectory": {
+        "type": "trapezoid",
+        "distance_deg": 90,
+        "maximum_velocity_deg_per_s": 300,
+        "maximum_acceleration_deg_per_s2": 1500,
+    },
+    "controller": {"type": "pd", "proportional_nm_per_rad": 1.0, "derivative_nm_s_per_rad": 0.01},
+}
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "load", "said"),
+    [
+        ({}, {}, []),
+        # 28 kg m^2 at 1500 deg/s^2 is 733 N m, and the gear's momentary peak 113.
+        ({}, {"inertia_kg_m2": 28}, ["found up to 733 N m", "154 times that of motor and wave generator"]),
+        ({"maximum_velocity_deg_per_s": 72000, "distance_deg": 4e6}, {}, ["12,000 rpm at the output"]),
+        ({}, {"torque": {"type": "sine", "amplitude_nm": 200, "frequency_hz": 3}}, ["found up to 207.9 N m"]),
+        ({}, {"gravity": {"mass_kg": 30, "centre_of_mass_m": 0.5}}, ["load.gravity: found up to 155 N m"]),
+    ],
+)
+def test_what_no_gear_of_that_size_carries(
+    trajectory: dict[str, Any], load: dict[str, Any], said: list[str]
+) -> None:
+    found = doubts(
+        Scenario.model_validate(
+            {
+                "drive": {"preset": "csg-17-80"},
+                "command": {"motor": MOVE | {"trajectory": MOVE["trajectory"] | trajectory}},
+                "load": {"inertia_kg_m2": 0.3} | load,
+                "run": {"duration_s": 100.0},
+            }
+        )
+    )
+    assert len(found) == len(said)
+    assert all(text in line for text, line in zip(said, found, strict=True)), found
+
+
 def test_check_says_it_and_the_scenario_is_fine(tmp_path: Path) -> None:
     path = tmp_path / "double.yaml"
     path.write_text(f"extends: {SCENARIOS / 'seed_move.yaml'}\neffects: {{lugre_friction: {{}}}}\n")

@@ -12,11 +12,13 @@ from hdsim.drive.ratings import ratings
 from hdsim.recording import Column, Event, Table
 from hdsim.scenario.model import Scenario
 from hdsim.simulation.events import EventDetector
+from hdsim.simulation.limit_cycle import ARCSEC, RestWatch, limit_cycle
 from hdsim.simulation.limits import Bearing
 from hdsim.simulation.quota import BURST, MOST, Quota
 from hdsim.simulation.setup import build_model, build_run
 from hdsim.simulation.solvers import Statistics
 from hdsim.simulation.watches import Flanks, Watch
+from hdsim.validate import play
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -221,6 +223,31 @@ def test_the_chatter_of_a_whole_run_is_told_to_its_end():
     quarters = np.histogram([e.time for e in told], 4, (0, run.duration_s))[0]
     assert (quarters >= 4).all()
     assert len(told) < 6 * MOST
+
+
+def test_a_swing_at_rest_is_told_however_the_samples_are_cut():
+    time = np.arange(4001) / 1000
+    rests = time > 1.0
+    swing = np.where(rests, 5e-5 * np.sin(2 * np.pi * 7 * time), 0.0)
+
+    def told(cuts: list[int]) -> list[Event]:
+        watch = RestWatch()
+        parts = zip(*(np.split(x, cuts) for x in (time, swing, rests)), strict=True)
+        return [event for part in parts for event in watch.feed(*part)] + list(watch.end())
+
+    (event,) = told([])
+    assert told([500, 1001, 1002, 3000]) == [event]
+    assert (event.time, event.level) == (4.0, "warning")
+    assert "swings by 10.3 arcsec (-10.3 to 10.3 off its command) at 7 Hz" in event.message
+    assert told([])[0].message.endswith("rests since 1.001 s")
+
+
+def test_the_limit_cycle_of_a_loop_over_play_is_the_one_of_an_ode_of_its_own():
+    time, angle = play.with_hdsim()
+    found = limit_cycle(time, angle - play.REFERENCE)
+    # SciPy's LSODA on the loop written down again (row of README.md): 327.5 arcsec, 13.18 Hz.
+    assert found is not None
+    assert (found.amplitude_rad * ARCSEC, found.frequency_hz) == pytest.approx((327.5, 13.18), rel=1e-3)
 
 
 def test_doubts_about_the_solution_are_told():

@@ -5,8 +5,13 @@ import pytest
 from engine_cases import SCENARIO
 
 from hdsim.scenario import Scenario
-from hdsim.study.engine.budget import error_budget, plot_budget
+from hdsim.simulation.simulate import simulate
+from hdsim.study.engine.budget import error_budget
+from hdsim.study.engine.budget_plot import plot_budget
 from hdsim.study.engine.causes import causes
+from hdsim.study.engine.definition import Base, Study, ValueList
+from hdsim.study.engine.reading import plan
+from hdsim.study.engine.study import run_study
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 ARCSEC = math.degrees(1) * 3600
@@ -65,6 +70,11 @@ def test_parts_of_a_linear_drive_are_the_analytic_ones_and_add_up():
     total = sum(part.removed for part in found.parts)
     assert found.whole == pytest.approx(found.rest + total + found.interaction, abs=1e-9)
     assert abs(found.rest) < 0.01
+    assert found.swing_arcsec == 0.0
+    # The sag needs both: Shapley gives each half of it, and nothing is left over.
+    assert parts["wind_up"].share.value == pytest.approx(wind_up + sag / 2, rel=0.01)
+    assert parts["friction_and_control"].share.value == pytest.approx(sag / 2, rel=0.05)
+    assert found.rest + sum(part.share.value for part in found.parts) == pytest.approx(found.whole, abs=1e-9)
 
 
 def test_backlash_is_the_gap_when_a_load_closes_it():
@@ -74,7 +84,7 @@ def test_backlash_is_the_gap_when_a_load_closes_it():
     data["drive"]["mesh"]["half_gap_m"] = half_gap
     for name in ("kinematic_error", "torsional_hysteresis_maxwell"):
         data["effects"][name] = None
-    found = error_budget(Scenario.model_validate(data))
+    found = error_budget(Scenario.model_validate(data), shares=False)
     backlash = next(part for part in found.parts if part.cause.name == "backlash")
     mesh, geometry = scenario.drive.mesh, scenario.drive.geometry
     assert mesh.model == "teeth"
@@ -83,11 +93,26 @@ def test_backlash_is_the_gap_when_a_load_closes_it():
     assert backlash.removed == pytest.approx(-ARCSEC * half_gap / lever, rel=0.02)
 
 
+def test_run_budget_and_study_have_one_error_to_the_last_bit(tmp_path):
+    data = LINEAR | {"run": {"duration_s": 0.6, "seed": 11}}
+    scenario = Scenario.model_validate(data)
+    own = simulate(scenario).metrics()["positioning_error"].value
+    assert abs(error_budget(scenario, shares=False).whole) == own
+    given = Study(
+        base=Base(scenario=data),
+        parameters={"load.inertia_kg_m2": ValueList(type="list", values=[0.3, 0.4])},
+        metrics=["positioning_error"],
+    )
+    table = run_study(plan(given), tmp_path).table
+    assert table.values("positioning_error")[0] == own
+    assert table.columns["seed"].values == [11, 11]
+
+
 def test_scenario_without_dwells_splits_its_transmission_error():
     found = error_budget(Scenario.model_validate(SCENARIO))
     (part,) = found.parts
     assert found.error == "transmission_error_peak_to_peak"
-    assert part.removed == part.alone == pytest.approx(60, rel=1e-3)
+    assert part.removed == part.alone == part.share.value == pytest.approx(60, rel=1e-3)
     assert (found.rest, found.interaction) == pytest.approx((0, 0), abs=1e-6)
 
 

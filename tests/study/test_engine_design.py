@@ -7,7 +7,7 @@ from pydantic import TypeAdapter, ValidationError
 from scipy import stats
 
 from hdsim.study.engine.definition import Variation
-from hdsim.study.engine.design import quantile, run_seed, runs, sampled
+from hdsim.study.engine.design import drive_seed, quantile, runs, sampled
 
 INERTIA, STIFFNESS = "load.inertia_kg_m2", "drive.torsion.damping_nm_s_per_rad"
 
@@ -87,21 +87,35 @@ def test_stratified_samples_meet_every_slice_once(kind):
         assert sorted(np.floor(column * 64).astype(int)) == list(range(64))
 
 
-def test_seeds_depend_on_study_and_run_only_and_differ():
-    seeds = [run.seed for run in runs(study(replicates=1000, seed=7))]
-    assert seeds == [run_seed(7, k) for k in range(1000)]
+def test_the_first_drive_is_the_scenarios_own_and_the_others_differ():
+    seeds = [run.seed for run in runs(study(replicates=1000, seed=7), own_seed=42)]
+    assert seeds[0] == 42
+    assert seeds[1:] == [drive_seed(42, 7, k) for k in range(1, 1000)]
     assert len(set(seeds)) == 1000
     assert max(seeds) < 2**63
-    assert not set(seeds) & {run.seed for run in runs(study(replicates=1000, seed=8))}
+    assert not set(seeds[1:]) & {run.seed for run in runs(study(replicates=1000, seed=8))}
 
 
-def test_common_surfaces_repeat_the_seeds_at_every_point():
-    found = runs(
-        study(parameters={INERTIA: {"type": "list", "values": [0.1, 0.2]}}, replicates=3, surfaces="common")
-    )
-    seeds = [run.seed for run in found]
-    assert seeds[:3] == seeds[3:]
-    assert len(set(seeds[:3])) == 3
+STATED = {INERTIA: {"type": "list", "values": [0.1, 0.2]}}
+SAMPLED = {AMPLITUDE: {"type": "uniform", "low": 0, "high": 1}}
+TWO = {"type": "random", "samples": 2}
+
+
+@pytest.mark.parametrize(
+    ("given", "drives"),
+    [
+        # Stated values meet the same drives unless they are to be independent.
+        ({"parameters": STATED}, "012 012"),
+        ({"parameters": STATED, "surfaces": "independent"}, "012 345"),
+        # Samples of a distribution stand for drives of a series, but in a sensitivity analysis.
+        ({"parameters": STATED | SAMPLED, "sampling": TWO}, "012345 012345"),
+        ({"parameters": STATED | SAMPLED, "sampling": TWO, "surfaces": "common"}, "012012 012012"),
+        ({"parameters": SAMPLED, "sampling": {"type": "morris", "trajectories": 2}}, "012012012012"),
+    ],
+)
+def test_which_runs_have_the_same_drive(given, drives):
+    found = [run.seed for run in runs(study(replicates=3, **given), own_seed=5)]
+    assert found == [drive_seed(5, 0, int(k)) for k in drives.replace(" ", "")]
 
 
 @pytest.mark.parametrize(

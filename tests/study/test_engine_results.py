@@ -3,7 +3,8 @@ import json
 
 import numpy as np
 import pytest
-from engine_cases import AMPLITUDE, METRIC, SCENARIO, study
+from engine_cases import AMPLITUDE, METRIC, SCENARIO, TOOTHED, study
+from scipy import stats
 
 from hdsim.study.engine.plots import study_figures, swings
 from hdsim.study.engine.reading import plan
@@ -34,6 +35,34 @@ def test_intervals_agree_with_closed_forms():
     assert upper.low < upper.value < upper.high
     assert upper.low < 10 + 1.645 * 2 < upper.high
     assert np.isnan(mean_interval(values[:1], 0.95).low)
+
+
+def test_differences_are_paired_over_the_same_drives(tmp_path):
+    values = {"type": "list", "values": [2e-6, 4e-6, 6e-6]}
+    given = study(TOOTHED, parameters={"drive.mesh.pitch_error_m": values}, replicates=5, confidence=0.9)
+    result = run_study(plan(given), tmp_path)
+    first, second, third = summarise(result.plan, result.table)
+    measured = result.table.values(METRIC).reshape(3, 5)
+    assert (first.pairs, second.pairs) == (0, 5)
+    assert np.isnan(first.difference.value)
+    for found, row in ((second, measured[1]), (third, measured[2])):
+        expected = stats.ttest_rel(row, measured[0]).confidence_interval(0.9)
+        interval = found.difference
+        assert (interval.low, interval.high) == pytest.approx((expected.low, expected.high))
+        # What the drives have in common is no part of the difference.
+        assert interval.high - interval.low < found.mean.high - found.mean.low
+    apart = run_study(plan(given.model_copy(update={"surfaces": "independent"})), tmp_path / "apart")
+    assert [s.pairs for s in summarise(apart.plan, apart.table)] == [0, 0, 0]
+
+
+def test_a_time_that_never_comes_is_in_the_summary():
+    values = np.array([0.1, 0.2, np.inf])
+    assert mean_interval(values, 0.95).value == np.inf
+    assert np.isnan(mean_interval(values, 0.95).low)
+    assert (quantile_interval(values, 0.5, 0.95).value, quantile_interval(values, 0.95, 0.95).value) == (
+        0.2,
+        np.inf,
+    )
 
 
 def test_mean_interval_covers_the_truth_as_often_as_it_says():

@@ -3,6 +3,7 @@ from engine_cases import AMPLITUDE, METRIC, SCENARIO, TOOTHED
 
 from hdsim.errors import InputError
 from hdsim.scenario import Scenario
+from hdsim.study.engine.definition import Base
 from hdsim.study.engine.tolerance import find_tolerance, plot_tolerance
 
 
@@ -57,6 +58,36 @@ def test_every_value_is_tried_on_the_same_drives_and_the_worst_count():
     assert list(half.probes[0].metric) == list(low.metric)
     assert half.probes[0].quantile == sorted(low.metric)[4]
     assert high.value == 1e-6
+
+
+def test_a_metric_that_no_run_gives_is_said_with_the_test_that_does():
+    with pytest.raises(InputError, match=r"needs a locked motor.*a bench procedure that does: torsion"):
+        find(metric="lost_motion", low=0.1, high=0.2)
+
+
+def test_a_bench_procedure_is_a_base():
+    # A lumped drive's lost motion is 2 T / K1 with T = 3 % of 52 N m, whatever its surfaces.
+    drive = {"preset": "csg-20-100", "mesh": {"model": "lumped"}}
+    base = Base(procedure="torsion", drive=drive, options={"period_s": 1.0}, run={"rtol": 1e-4})
+    found = find_tolerance(
+        base, metric="lost_motion", limit=60.0, parameter="drive.torsion.stiffness_k1_nm_per_rad",
+        low=8e3, high=16e3, replicates=2,
+    )  # fmt: skip
+    assert found.value == pytest.approx(2 * 0.03 * 52 / (60 / 206265), rel=0.02)
+    assert all(not probe.reasons for probe in found.probes)
+
+
+def test_drives_that_fail_are_counted_with_their_reason():
+    # Gaps of 20 um alone are softer than the catalogue's whole drive.
+    base = Base(procedure="torsion", drive={"preset": "csg-20-100"}, options={"period_s": 1.0})
+    found = find_tolerance(
+        base, metric="lost_motion", limit=1e6, parameter="drive.mesh.half_gap_m", low=1e-7, high=2e-5,
+        replicates=2, precision=10.0,
+    )  # fmt: skip
+    assert found.value == 1e-7
+    ((reason, count),) = found.probes[-1].reasons
+    assert (found.probes[-1].given, count) == (0, 2)
+    assert "soft" in reason or "stiff" in reason
 
 
 def test_range_and_names_are_checked():

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from hdsim.drive.parameters import Drive
 from hdsim.errors import HdsimError
 from hdsim.study.known_metrics import find_metric
 from hdsim.study.metrics._spans import ARCSEC
@@ -16,8 +15,8 @@ from hdsim.study.registry import BenchRun, Procedure
 if TYPE_CHECKING:
     from hdsim.drive.catalogue import CatalogueFigures
 
-#: Total slip torque of the hysteresis over K1, rad: 2 N m at size 20, ratio 100, a loss of about 0.9 arcmin.
-SLIP_ANGLE = 1.25e-4
+#: Effects of a drive that is a preset: what the catalogue prints besides stiffness and friction.
+CATALOGUE_EFFECTS = {"set": "catalogue"}
 
 #: Allowed deviation from a printed typical friction torque.
 TYPICAL = 0.10
@@ -82,18 +81,6 @@ class Row:
         if self.problem:
             return False
         return None if self.line is None else self.line.holds(self.value)
-
-
-def default_effects(drive: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """What a drive of the catalogue has besides stiffness and friction: kinematic error and hysteresis.
-
-    The catalogue prints one hysteresis loss for all sizes, so the slip torque grows with the stiffness K1.
-    """
-    stiffness = Drive.model_validate(dict(drive)).torsion.stiffness_k1_nm_per_rad
-    return {
-        "kinematic_error": {},
-        "torsional_hysteresis_maxwell": {"slip_torque_nm": SLIP_ANGLE * stiffness},
-    }
 
 
 def catalogue_lines(figures: CatalogueFigures) -> dict[str, Line]:

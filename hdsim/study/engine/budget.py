@@ -1,4 +1,4 @@
-"""Error budget: a positioning error split into its causes by switching them off, and on, one at a time.
+"""Error budget: a positioning error split into its causes by switching them off and on.
 
 With E(S) the error of a run in which the causes S are on, and N all of them:
 
@@ -7,14 +7,18 @@ With E(S) the error of a run in which the causes S are on, and N all of them:
 
 The interaction is zero when the causes add up (removed_i = alone_i); what couples them, such as a gap that
 only a load closes, is in it and nowhere else. It is the remainder of a one-at-a-time analysis (Saltelli et
-al. 2008, Global Sensitivity Analysis, section 1.2).
+al. 2008, Global Sensitivity Analysis, section 1.2), and may exceed the whole. Shapley's shares
+(``hdsim.study.engine.shapley``) give it back to the causes: whole = rest + sum share_i.
 """
 
 from __future__ import annotations
 
 import copy
 import csv
+import itertools
 import json
+import math
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,12 +30,19 @@ from numpy.typing import NDArray
 from hdsim.errors import HdsimError, InputError
 from hdsim.study.engine.causes import Cause, causes
 from hdsim.study.engine.execute import InProcess
+from hdsim.study.engine.shapley import (
+    MOST_EXACT,
+    Coalition,
+    Share,
+    coalitions,
+    drawn_orders,
+    shapley_shares,
+)
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hdsim.recording import Recording
     from hdsim.scenario.model import Scenario
+    from hdsim.study.metrics._spans import Dwell
 
 Array = NDArray[np.float64]
 
@@ -47,11 +58,13 @@ class Part:
         cause: which.
         removed: how much the error falls when it alone is switched off.
         alone: how much the error grows when it alone is switched on.
+        share: its Shapley share; None where only these two were asked for.
     """
 
     cause: Cause
     removed: float
     alone: float
+    share: Share | None = None
 
 
 @dataclass(frozen=True)
@@ -62,9 +75,12 @@ class Budget:
         scenario: name of the scenario.
         error: what was split.
         unit: of all numbers.
-        whole: the error with all causes.
+        whole: the error with all causes; a positioning error has its sign, its size is the metric's.
         rest: the error with none of them.
         parts: the causes, largest first.
+        runs: number of runs that were made.
+        orders: number of orders that were drawn for the shares; 0: all combinations were run.
+        swing_arcsec: amplitude of the limit cycle at rest whose mean a positioning error is; 0: none.
     """
 
     scenario: str
@@ -73,6 +89,9 @@ class Budget:
     whole: float
     rest: float
     parts: tuple[Part, ...]
+    runs: int
+    orders: int = 0
+    swing_arcsec: float = 0.0
 
     @property
     def interaction(self) -> float:
@@ -87,97 +106,130 @@ class Budget:
     def write_csv(self, path: Path) -> Path:
         """Write as CSV."""
         path.parent.mkdir(parents=True, exist_ok=True)
+        unit = self.unit
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["cause", f"removed [{self.unit}]", f"alone [{self.unit}]", "switched off"])
+            shares = [f"share [{unit}]", f"standard error of the share [{unit}]"]
+            writer.writerow(["cause", *shares, f"removed [{unit}]", f"alone [{unit}]", "switched off"])
             for part in self.parts:
-                writer.writerow([part.cause.title, part.removed, part.alone, part.cause.switched])
-            writer.writerow(["rest", self.rest, self.rest, "error with all causes off"])
-            writer.writerow(
-                ["interaction", self.interaction, self.interaction_alone, "whole less all of the above"]
-            )
-            writer.writerow(["whole", self.whole, self.whole, "error with all causes on"])
+                share = ("", "") if part.share is None else (part.share.value, part.share.standard_error)
+                writer.writerow([part.cause.title, *share, part.removed, part.alone, part.cause.switched])
+            writer.writerow(["rest", self.rest, "", self.rest, self.rest, "error with all causes off"])
+            together = (self.interaction, self.interaction_alone)
+            writer.writerow(["interaction", "", "", *together, "whole less all of the above"])
+            writer.writerow(["whole", self.whole, "", self.whole, self.whole, "error with all causes on"])
         return path
 
 
-def error_budget(scenario: Scenario, *, metric: str | None = None, pool: Executor | None = None) -> Budget:
+def error_budget(
+    scenario: Scenario,
+    *,
+    metric: str | None = None,
+    shares: bool = True,
+    orders: int = 16,
+    pool: Executor | None = None,
+    on_progress: Callable[[int, int], object] | None = None,
+) -> Budget:
     """Split an error of a scenario into its causes.
 
     Args:
-        scenario: what is positioned. With a position command and dwells, the error is output angle less
-            commanded angle (arcsec, with its sign) at the dwell where it is largest, the mean over the last
-            fifth of the dwell; without, it is the peak-to-peak transmission error of the run.
+        scenario: what is positioned. With a position command and dwells, the error is output less
+            commanded angle (arcsec, with its sign) at the dwell where it is largest, as the metric
+            ``positioning_error``; without, it is the peak-to-peak transmission error of the run.
         metric: any metric by name, to be split instead.
+        shares: find Shapley's shares: exactly, from all combinations, of up to six causes.
+        orders: number of random orders from which the shares of more causes are estimated, two at least.
         pool: where the runs are made; in this process when None.
+        on_progress: called with the number of runs that are done and of all runs.
 
     Raises:
         InputError: the scenario has no cause that can be switched, or the metric does not fit it.
-        HdsimError: a run stopped early.
+        HdsimError: a run stopped early, or its error is no finite number.
     """
+    from hdsim.study.known_metrics import find_metric
+
     found = causes(scenario)
     if not found:
         raise InputError("the scenario has no cause of error that can be switched off")
-    everything = tuple(cause.name for cause in found)
-    pool = pool or InProcess()
+    names = [cause.name for cause in found]
+    everything, nothing = frozenset(names), Coalition()
+    drawn = drawn_orders(names, max(2, orders)) if shares and len(names) > MOST_EXACT else []
+    wanted = [everything, nothing]
+    for name in names:
+        wanted += [everything - {name}, frozenset([name])]
+    wanted += coalitions(names, drawn) if shares else []
+    sets = list(dict.fromkeys(wanted))
+
     text = json.dumps(_prepared(scenario))
-    whole_run, _ = _run(text, everything)
+    whole_run, prepared = _run(text, everything)
     reference = whole_run["reference_angle"] if "reference_angle" in whole_run else None  # noqa: SIM401
     error, unit, dwell = _chosen(whole_run, metric)
-
-    sets: list[tuple[str, ...]] = [everything, ()]
-    for name in everything:
-        sets += [tuple(n for n in everything if n != name), (name,)]
-    unique = list(dict.fromkeys(sets))
-    futures = {s: pool.submit(_error, text, s, error, dwell, reference) for s in unique}
-    values = {s: future.result() for s, future in futures.items()}
-    whole, rest = values[everything], values[()]
+    values = {everything: _value(whole_run, prepared, error, dwell, everything)}
+    pool = pool or InProcess()
+    done = itertools.count(2)
+    futures = {}
+    for s in sets[1:]:
+        futures[s] = pool.submit(_error, text, s, error, dwell, reference)
+        if on_progress is not None:
+            futures[s].add_done_callback(lambda _: on_progress(next(done), len(sets)))
+    values |= {s: future.result() for s, future in futures.items()}
+    whole, rest = values[everything], values[nothing]
+    by_name = shapley_shares(names, values, drawn) if shares else {}
     parts = [
         Part(
             cause,
-            whole - values[tuple(n for n in everything if n != cause.name)],
-            values[(cause.name,)] - rest,
+            whole - values[everything - {cause.name}],
+            values[frozenset([cause.name])] - rest,
+            by_name.get(cause.name),
         )
         for cause in found
     ]
-    parts.sort(key=lambda part: -abs(part.removed))
-    return Budget(scenario.name, error, unit, whole, rest, tuple(parts))
+    parts.sort(key=lambda part: -abs(part.removed if part.share is None else part.share.value))
+    swing = 0.0 if dwell is None else find_metric("limit_cycle_amplitude")(whole_run, prepared)
+    return Budget(scenario.name, error, unit, whole, rest, tuple(parts), len(sets), len(drawn), swing)
 
 
 def _prepared(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json")
     data["run"]["teeth_rate_hz"] = 0.0
-    mesh = data["drive"]["mesh"]
-    if mesh["model"] == "tabulated":
-        # A gap cannot be closed in a finished table; the teeth themselves give the same torque.
-        del mesh["twist_nodes"], mesh["angle_nodes"]
-        mesh["model"] = "teeth"
     return data
 
 
-def _chosen(recording: Recording, metric: str | None) -> tuple[str, str, tuple[int, int] | None]:
-    """Name and unit of the error, and the samples over which a positioning error is the mean."""
+def _chosen(recording: Recording, metric: str | None) -> tuple[str, str, Dwell | None]:
+    """Name and unit of the error, and the dwell at which a positioning error is looked at."""
     from hdsim.study.known_metrics import find_metric
-    from hdsim.study.metrics._spans import dwells
+    from hdsim.study.metrics.motion import worst_dwell
 
     if metric is not None and metric != POSITIONING:
         return metric, find_metric(metric).unit, None
     try:
-        rests = dwells(recording)
+        return POSITIONING, "arcsec", worst_dwell(recording)
     except InputError:
         if metric is not None:
             raise
         return "transmission_error_peak_to_peak", "arcsec", None
-    worst = max(rests, key=lambda rest: abs(rest.attained(recording["tracking_error"])))
-    start, stop = worst.samples.start, worst.samples.stop
-    return POSITIONING, "arcsec", (stop - max(1, (stop - start) // 5), stop)
 
 
-def _error(
-    text: str, on: tuple[str, ...], error: str, dwell: tuple[int, int] | None, reference: Array | None
-) -> float:
+def _value(recording: Recording, scenario: Scenario, error: str, dwell: Dwell | None, on: Coalition) -> float:
+    """The error of a run.
+
+    Raises:
+        HdsimError: it is infinite.
+    """
+    from hdsim.study.known_metrics import find_metric
+    from hdsim.study.metrics.motion import deviation
+
+    if dwell is not None:
+        return deviation(recording, dwell)
+    found = find_metric(error)(recording, scenario)
+    if not math.isfinite(found):
+        raise HdsimError(f"{_with(on)}, {error} is {found}: what never ends cannot be split into causes")
+    return found
+
+
+def _error(text: str, on: Coalition, error: str, dwell: Dwell | None, reference: Array | None) -> float:
     """The error of a run with some causes on; runs on a worker."""
     from hdsim.recording import Column
-    from hdsim.study.known_metrics import find_metric
 
     recording, scenario = _run(text, on)
     if reference is not None and "reference_angle" not in recording:
@@ -187,12 +239,14 @@ def _error(
         columns["tracking_error"] = Column(
             recording["output_angle"] - reference, "rad", "output less commanded"
         )
-    if dwell is None:
-        return find_metric(error)(recording, scenario)
-    return float(np.degrees(np.mean(recording["tracking_error"][slice(*dwell)])) * 3600.0)
+    return _value(recording, scenario, error, dwell, on)
 
 
-def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
+def _with(on: Coalition) -> str:
+    return f"with only {', '.join(sorted(on)) or 'nothing'} on"
+
+
+def _run(text: str, on: Coalition) -> tuple[Recording, Scenario]:
     """Simulate with the causes ``on`` and no others.
 
     Raises:
@@ -210,64 +264,22 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
             data["effects"][effect] = None
         if cause.change is not None:
             cause.change(data)
+    mesh = data["drive"]["mesh"]
+    in_teeth = {"backlash", "kinematic_error"} & {cause.name for cause in off}
+    if mesh["model"] == "tabulated" and in_teeth:
+        # A gap cannot be closed in a finished table; the teeth themselves give the same torque.
+        del mesh["twist_nodes"], mesh["angle_nodes"]
+        mesh["model"] = "teeth"
     scenario = Scenario.model_validate(data)
     run = build_run(scenario)
     model = run.model
     if model.teeth is not None:
         numbers = model.system.reals[int(model.system.integers[_layout.MESH_AT]) :]
-        for cause in off:
-            if cause.name == "backlash":
-                model.teeth.close_gaps(numbers)
-            elif cause.name == "kinematic_error":
-                model.teeth.remove_pitch_errors(numbers)
+        for name in in_teeth:
+            (model.teeth.close_gaps if name == "backlash" else model.teeth.remove_pitch_errors)(numbers)
     recording = run.record()
     if run.interrupted is not None:
         raise run.interrupted
     if run.failure:
-        raise HdsimError(f"with only {', '.join(on) or 'nothing'} on, the run stopped early: {run.failure}")
+        raise HdsimError(f"{_with(on)}, the run stopped early: {run.failure}")
     return recording, scenario
-
-
-def plot_budget(budget: Budget) -> Figure:
-    """Waterfall: from the rest over every cause and the interaction to the whole."""
-    from hdsim.plot import style
-    from hdsim.study.engine.plots import page
-
-    rows: list[tuple[str, float, str]] = [
-        *((part.cause.title, part.removed, style.BLUE) for part in budget.parts),
-        ("interaction", budget.interaction, style.GREY),
-        ("rest (all off)", budget.rest, style.GREY),
-    ]
-    name = budget.error.replace("_", " ")
-    about = (
-        f"Bars add up to the whole: how much the {name} changes when one cause is switched off. "
-        f"Ring: the cause alone, all others off; far from its bar's length, the causes work "
-        f"together (interaction)."
-    )
-    if budget.error == POSITIONING:
-        about = f"Output less commanded angle, at rest, where it is largest. {about}"
-    size = (9.0, max(3.2, 2.0 + 0.45 * len(rows)))
-    with page(f"{budget.scenario}: where the {name} comes from", about, size, 100) as (figure, axes):
-        start, last = 0.0, len(rows)
-        ends = [0.0]
-        for k, (_title, value, colour) in enumerate(rows):
-            at = last - k
-            axes.barh(at, value, left=start, color=colour, height=0.6)
-            if k < len(budget.parts):
-                axes.plot(
-                    start + budget.parts[k].alone, at, "o", mfc="white", mec=style.ORANGE, mew=1.6, ms=7
-                )
-                ends.append(start + budget.parts[k].alone)
-            axes.plot([start + value] * 2, [at + 0.3, at - 1.3], color="#888888", lw=0.7)
-            start += value
-            ends.append(start)
-        axes.barh(0, budget.whole, color=style.BLACK, height=0.6)
-        low, high = min(ends), max(ends)
-        pad = 0.16 * (high - low or 1.0)
-        axes.set_xlim(low - pad * (low < 0), high + pad)
-        names = [f"{title}  {value:+.3g}" for title, value, _ in rows] + [f"whole  {budget.whole:+.3g}"]
-        axes.set_yticks(range(last, -1, -1), names)
-        axes.axvline(0.0, color="#666666", lw=0.8)
-        axes.set_xlabel(f"{name} ({budget.unit})")
-        axes.grid(axis="y", visible=False)
-    return figure

@@ -233,12 +233,15 @@ class Study(Parameters):
     sampling: Sampling | None = None
     """How the parameters with a distribution are sampled; all of them jointly."""
     replicates: int = Field(1, ge=1, le=1_000_000)
-    """Drives with other random tooth surfaces and noise at every point of the design."""
-    surfaces: Literal["independent", "common"] | None = None
-    """Seeds of the runs: every run its own, or replicate k the same at every point of the design (common
-    random numbers). Left out: common with sensitivity indices, else independent."""
+    """Drives with other random tooth surfaces and noise at every point of the design; the first is the
+    base's own (``run.seed``)."""
+    surfaces: Literal["common", "population", "independent"] | None = None
+    """Which runs have the same drive. ``common``: replicate k is one drive, whatever else varies.
+    ``population``: every sample of the distributions is a drive of its own, the same at all stated values.
+    ``independent``: no two runs. Left out: common, or population where distributions are
+    sampled at random."""
     seed: int = Field(0, ge=0, lt=2**63)
-    """Seed of the samples and of every run's seed."""
+    """Seed of the samples and of the drives after the base's own."""
     metrics: list[str] = Field(min_length=1)
     """Names of the metrics that are taken of every run."""
     keep_logs: bool = False
@@ -278,8 +281,14 @@ class Study(Parameters):
         return {name: v for name, v in self.parameters.items() if not isinstance(v, ValueList | Grid)}
 
     @property
-    def common_surfaces(self) -> bool:
-        """Whether replicate k has the same seed at every point of the design."""
-        if self.surfaces is None:
-            return isinstance(self.sampling, SobolIndices | Morris)
-        return self.surfaces == "common"
+    def drives(self) -> Literal["common", "population", "independent"]:
+        """Which runs have the same drive, as given or by the rule."""
+        if self.surfaces is not None:
+            return self.surfaces
+        designed = self.sampling is None or isinstance(self.sampling, SobolIndices | Morris)
+        return "common" if designed else "population"
+
+    @property
+    def paired(self) -> bool:
+        """Whether all stated values are met by the same drives, so that differences are theirs alone."""
+        return self.drives != "independent" and "run.seed" not in self.parameters

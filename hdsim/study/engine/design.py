@@ -28,8 +28,8 @@ from hdsim.study.engine.definition import (
 )
 
 Array = NDArray[np.float64]
-#: Random streams of a study, beside those of its runs.
-_SAMPLES, _SURFACES = 1, 2
+#: Random stream of a study's samples, beside those of its drives.
+_SAMPLES = 1
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,15 @@ class RunPoint:
     values: tuple[Any, ...]
 
 
-def runs(study: Study) -> list[RunPoint]:
+def runs(study: Study, own_seed: int = 0) -> list[RunPoint]:
     """All runs of a study.
 
     The design is the Cartesian product, slowest first: stated values (the first parameter slowest), samples
     of all distributions, replicates. Every combination of stated values meets the same samples.
+
+    Args:
+        study: the study.
+        own_seed: seed of the base scenario, which the study's first drive has.
     """
     names = list(study.parameters)
     factors = {name: factor_values(variation) for name, variation in study.factors.items()}
@@ -70,18 +74,27 @@ def runs(study: Study) -> list[RunPoint]:
             values = tuple((stated | drawn)[name] for name in names)
             for replicate in range(study.replicates):
                 index = len(found)
-                key = replicate if study.common_surfaces else index
-                seed = run_seed(study.seed, key, common=study.common_surfaces)
+                drive = {
+                    "common": replicate,
+                    "population": sample * study.replicates + replicate,
+                    "independent": index,
+                }[study.drives]
+                seed = drive_seed(own_seed, study.seed, drive)
                 found.append(RunPoint(index, point, sample, replicate, seed, values))
     return found
 
 
-def run_seed(study_seed: int, index: int, *, common: bool = False) -> int:
-    """Seed of a run, from the study's seed and the run's index (or the replicate's, when
-    seeds are common).
+def drive_seed(own_seed: int, study_seed: int, drive: int) -> int:
+    """Seed of a drive: drive 0 is the base scenario's own, the others follow from the study's seed.
+
+    Args:
+        own_seed: seed of the base scenario.
+        study_seed: the study's.
+        drive: number of the drive.
     """
-    stream = (_SURFACES, index) if common else (index,)
-    words = np.random.SeedSequence(study_seed, spawn_key=stream).generate_state(1, np.uint64)
+    if drive == 0:
+        return own_seed
+    words = np.random.SeedSequence(study_seed, spawn_key=(drive,)).generate_state(1, np.uint64)
     return int(words[0] >> np.uint64(1))
 
 

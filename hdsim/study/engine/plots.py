@@ -46,7 +46,7 @@ def study_figures(
     factors = list(plan.study.factors)
     for metric in plan.metrics:
         mine = [s for s in summaries if s.metric == metric.name]
-        if not any(s.runs for s in mine):
+        if not any(s.runs > s.never for s in mine):
             continue
         numeric = [f for f in factors if _is_numeric(table, f)]
         if len(factors) == 2 and len(numeric) == 2 and all(_levels(table, f) > 2 for f in factors):
@@ -149,7 +149,7 @@ def curves(
         for s in summaries:
             groups.setdefault(words({name: s.point[name] for name in others}), []).append(s)
         for k, (name, group) in enumerate(groups.items()):
-            group = sorted((s for s in group if s.runs), key=lambda s: float(s.point[over]))
+            group = sorted((s for s in group if s.runs and not s.never), key=lambda s: float(s.point[over]))
             x = np.array([float(s.point[over]) for s in group])
             mean = np.array([s.mean.value for s in group])
             colour = _LINES[k % len(_LINES)]
@@ -179,9 +179,15 @@ def heat_map(
     x = np.unique([float(s.point[x_name]) for s in summaries])
     y = np.unique([float(s.point[y_name]) for s in summaries])
     mean = np.full((len(y), len(x)), np.nan)
+    never: set[tuple[int, int]] = set()
     for s in summaries:
-        at = (np.searchsorted(y, float(s.point[y_name])), np.searchsorted(x, float(s.point[x_name])))
-        mean[at] = s.mean.value
+        at = (
+            int(np.searchsorted(y, float(s.point[y_name]))),
+            int(np.searchsorted(x, float(s.point[x_name]))),
+        )
+        mean[at] = s.mean.value if np.isfinite(s.mean.value) else np.nan
+        if s.never:
+            never.add(at)
     about = f"{metric.description}. Colour and numbers: mean of {max(s.runs for s in summaries)} run(s)."
     with page(_title(plan, metric), about) as (figure, axes):
         axes.grid(False)
@@ -194,7 +200,8 @@ def heat_map(
         if mean.size <= 150:
             middle = 0.5 * (np.nanmin(mean) + np.nanmax(mean))
             for (row, column), value in np.ndenumerate(mean):
-                text = "failed" if np.isnan(value) else f"{value:.3g}"
+                gone = "never" if (row, column) in never else "failed"
+                text = gone if np.isnan(value) else f"{value:.3g}"
                 ink = "white" if not value > middle else "black"
                 axes.text(column, row, text, ha="center", va="center", fontsize=8, color=ink)
     return figure
@@ -209,8 +216,9 @@ def bars(plan: Plan, metric: Metric, summaries: Sequence[MetricSummary]) -> Figu
         at = np.arange(len(summaries))[::-1]
         mean = np.array([s.mean.value for s in summaries])
         reach = np.array([[s.mean.value - s.mean.low, s.mean.high - s.mean.value] for s in summaries]).T
-        axes.barh(at, np.nan_to_num(mean), xerr=np.nan_to_num(reach), color=style.BLUE, capsize=3)
-        axes.set_yticks(at, [words(s.point) for s in summaries])
+        mean = np.where(np.isfinite(mean), mean, 0.0)
+        axes.barh(at, mean, xerr=np.nan_to_num(reach), color=style.BLUE, capsize=3)
+        axes.set_yticks(at, [words(s.point) + (f" ({s.never} never)" if s.never else "") for s in summaries])
         axes.set_xlabel(label(named(metric), metric.unit))
         axes.grid(axis="y", visible=False)
     return figure
@@ -221,6 +229,7 @@ def histogram(plan: Plan, metric: Metric, table: StudyTable, summary: MetricSumm
     values = table.values(metric.name)
     good = values[np.isfinite(values)]
     failed = f" {summary.failed} more failed." if summary.failed else ""
+    failed += f" {summary.never} more never." if summary.never else ""
     about = f"{metric.description}. {len(good)} runs.{failed}"
     with page(_title(plan, metric), about) as (figure, axes):
         edges = np.histogram_bin_edges(good, bins="fd" if np.ptp(good) > 0 else 1)
@@ -230,6 +239,8 @@ def histogram(plan: Plan, metric: Metric, table: StudyTable, summary: MetricSumm
             (summary.mean, style.BLACK, "mean"),
             (summary.high, style.ORANGE, "95 % of the runs stay below"),
         ):
+            if not np.isfinite(interval.value):
+                continue
             text = f"{name} {interval.value:.4g} {metric.unit}"
             if np.isfinite(interval.low):
                 text += f" ({plan.study.confidence:.0%} interval {interval.low:.4g} to {interval.high:.4g})"
@@ -269,7 +280,7 @@ def tornado(plan: Plan, metric: Metric, table: StudyTable) -> Figure:
     """How far each sampled parameter moves a metric, largest on top."""
     found = swings(plan, metric.name, table)
     values = table.values(metric.name)
-    mean = float(np.nanmean(values))
+    mean = float(np.mean(values[np.isfinite(values)]))
     about = (
         f"{metric.description}. Bars: mean of the metric as a parameter goes from its 5 % to its 95 % "
         f"quantile (numbers at the ends) and the others stay at their means; linear regression over "

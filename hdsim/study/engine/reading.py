@@ -34,7 +34,7 @@ class Plan:
 
     Args:
         study: what the user wrote.
-        scenario: the base scenario (its seed is replaced in every run).
+        scenario: the base scenario; its seed is that of the first drive.
         recipe: how to make the scenario of a run.
         runs: all runs, by index.
         metrics: what is measured.
@@ -52,7 +52,7 @@ class Plan:
     def definition(self) -> dict[str, Any]:
         """Everything that decides the results, as plain data."""
         study = self.study.model_dump(mode="json", exclude={"name", "description", "confidence", "base"})
-        return {"study": study, "recipe": [self.recipe.base, self.recipe.drive]}
+        return {"study": study, "recipe": [self.recipe.base, self.recipe.written]}
 
 
 def load_study(path: str | Path) -> Plan:
@@ -121,7 +121,7 @@ def plan(study: Study, source: Source | None = None) -> Plan:
             with _collected(problems, source, ("parameters", name)):
                 check(name, complete, Scenario)
     if not problems:
-        found = runs(study)
+        found = runs(study, scenario.run.seed)
         _check_values(study, recipe, found, source, problems)
     if problems:
         raise ScenarioError(sorted(problems, key=lambda problem: problem.mark.line))
@@ -143,8 +143,8 @@ def base_recipe(base: Base, names: tuple[str, ...], source: Source) -> tuple[Sce
         part = _part(source, ("base", "scenario"), base.scenario)
         built = build(part, Scenario)
         given: dict[str, Any] = {"scenario": built.model_dump(mode="json")}
-        drive = base.scenario.get("drive", {})
-        return built, Recipe(json.dumps(given), json.dumps(drive), names)
+        written = {name: base.scenario.get(name) or {} for name in ("drive", "effects")}
+        return built, Recipe(json.dumps(given), json.dumps(written), names)
     problems: list[Problem] = []
     with _collected(problems, source, ("base", "procedure")):
         find_procedure(base.procedure or "")
@@ -162,7 +162,7 @@ def base_recipe(base: Base, names: tuple[str, ...], source: Source) -> tuple[Sce
     }
     recipe = Recipe(json.dumps(given), "{}", names)
     try:
-        built = Recipe(recipe.base, "{}", ()).scenario((), 0)
+        built = Recipe(recipe.base, "{}", ()).scenario(())
     except ScenarioError as error:
         raise ScenarioError(
             Problem(source.mark(("base",)), f"base: {problem.field}", problem.text)
@@ -209,7 +209,7 @@ def _check_values(
             if any(type(value) is type(other) and value == other for other in tried):
                 continue
             tried.append(value)
-            single = Recipe(recipe.base, recipe.drive, (name,))
+            single = Recipe(recipe.base, recipe.written, (name,))
             mistake = _mistake(single, name, value)
             if mistake:
                 problems.append(Problem(source.mark(("parameters", name)), f"parameters: {name}", mistake))
@@ -222,7 +222,7 @@ def _mistake(single: Recipe, name: str, value: Any) -> str:
     Whether it fits the other parameters is known only in the run, whose row then holds the reason.
     """
     try:
-        single.scenario((value,), 0)
+        single.scenario((value,))
     except ScenarioError as error:
         own = [p.text for p in error.problems if p.field.startswith(name) or remakes_base(name)]
         return own[0] if own else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -14,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.scenario.problems import Mark
+from hdsim.scenario.reader import Source
 from hdsim.study.engine.definition import Base, Study, ValueList
-from hdsim.study.engine.design import run_seed
+from hdsim.study.engine.design import drive_seed
 from hdsim.study.engine.execute import InProcess, batches, execute
-from hdsim.study.engine.worker import Job, Row
+from hdsim.study.engine.worker import Batch, Job, Row, run_batch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,12 +39,19 @@ class Probe:
         metric: one a drive, NaN where the run failed, shape (replicates,).
         quantile: the metric that the wanted share of the drives does not exceed (failed drives exceed all).
         passing: share of the drives within the limit.
+        reasons: why drives gave no number, with how many.
     """
 
     value: float
     metric: Array
     quantile: float
     passing: float
+    reasons: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def given(self) -> int:
+        """Number of drives that gave a number."""
+        return int(np.count_nonzero(~np.isnan(self.metric)))
 
 
 @dataclass(frozen=True)
@@ -86,7 +96,7 @@ class Tolerance:
 
 
 def find_tolerance(
-    scenario: Scenario,
+    base: Scenario | Base,
     *,
     metric: str,
     limit: float,
@@ -109,14 +119,14 @@ def find_tolerance(
     parameter over the range; the found value lies next to the end that meets the limit.
 
     Args:
-        scenario: the base.
+        base: a scenario, or what a study's base says: a bench procedure and its drive.
         metric: name of the metric.
         limit: its largest allowed value, in its unit.
         parameter: dotted name of the parameter.
         confidence: share of the drives that must meet the limit.
-        replicates: drives with other random surfaces and noise.
-        low: lower end of the range; a hundredth of the scenario's value when None.
-        high: upper end; a hundred times the scenario's value when None.
+        replicates: drives with other random surfaces and noise, the first one the base's own.
+        low: lower end of the range; a hundredth of the base's value when None.
+        high: upper end; a hundred times the base's value when None.
         logarithmic: bisect ratios; when None, if both ends are above 0 and a factor 10 apart.
         precision: width of the last interval, relative to the value (or to the range when not logarithmic).
         seed: seed of the drives.
@@ -125,12 +135,18 @@ def find_tolerance(
         on_probe: called with every probe.
 
     Raises:
-        InputError: unknown names, or a range that the parameter does not allow.
+        InputError: unknown names, a range that the parameter does not allow, or a metric that no run gives.
     """
     from hdsim.study.engine.names import get_value
-    from hdsim.study.engine.reading import plan
+    from hdsim.study.engine.reading import base_recipe, plan
 
-    now = get_value(scenario.model_dump(mode="json"), parameter) if low is None or high is None else None
+    if not isinstance(base, Base):
+        base = Base(scenario=base.model_dump(mode="json"))
+    if low is None or high is None:
+        source = Source(base.model_dump(mode="json"), {(): Mark("base")})
+        now = get_value(base_recipe(base, (), source)[0].model_dump(mode="json"), parameter)
+    else:
+        now = None
     if now is not None and (isinstance(now, bool) or not isinstance(now, int | float) or now <= 0):
         raise InputError(f"{parameter} is {now!r} in the scenario: give the range with --low and --high")
     if now is None and (low is None or high is None):
@@ -142,7 +158,7 @@ def find_tolerance(
     # A study of the two ends checks names, types and bounds with the messages of any study.
     ends = Study(
         name="tolerance",
-        base=Base(scenario=scenario.model_dump(mode="json")),
+        base=base,
         parameters={parameter: ValueList(type="list", values=[low, high])},
         metrics=[metric],
     )
@@ -150,9 +166,16 @@ def find_tolerance(
     logarithmic = (low > 0 and high >= 10 * low) if logarithmic is None else logarithmic
     if logarithmic and low <= 0:
         raise InputError(f"a logarithmic bisection needs a range above 0, found {low:g}")
-    seeds = [run_seed(seed, k, common=True) for k in range(replicates)]
+    seeds = [drive_seed(checked.scenario.run.seed, seed, k) for k in range(replicates)]
     executor = pool or InProcess()
     probes: list[Probe] = []
+
+    # A metric of another test is missing from every run: the first drive tells.
+    alone = [run_batch(Batch(checked.recipe, (metric,), (Job(0, seeds[0], (low,)),)))[0]]
+    if alone[0].reason.startswith(f"{metric}: "):
+        alone += run_batch(Batch(checked.recipe, (metric,), (Job(0, seeds[0], (high,)),)))
+        if not any(row.metrics for row in alone):
+            raise InputError(_nothing(checked.scenario.name, metric, [(alone[0].reason, 1)]))
 
     def probe(value: float) -> bool:
         jobs = [Job(k, s, (value,)) for k, s in enumerate(seeds)]
@@ -166,13 +189,18 @@ def find_tolerance(
         values = np.array([rows[k].metrics.get(metric, np.nan) for k in range(replicates)])
         worst_first = np.where(np.isnan(values), np.inf, values)
         quantile = float(np.quantile(worst_first, confidence, method="higher"))
-        found = Probe(value, values, quantile, float(np.mean(worst_first <= limit)))
+        reasons = Counter(row.reason for row in rows.values() if row.reason)
+        found = Probe(
+            value, values, quantile, float(np.mean(worst_first <= limit)), tuple(reasons.most_common())
+        )
         probes.append(found)
         if on_probe is not None:
             on_probe(found)
         return quantile <= limit
 
     ok_low, ok_high = probe(low), probe(high)
+    if not any(probe.given for probe in probes):
+        raise InputError(_nothing(checked.scenario.name, metric, probes[0].reasons))
     whole_range = ok_low and ok_high
     value: float | None = None
     if whole_range:
@@ -192,6 +220,16 @@ def find_tolerance(
         metric, unit, limit, parameter, checked.units[parameter], confidence, value, whole_range,
         0.0 if at is None else _yield_low(at, confidence), tuple(sorted(probes, key=lambda p: p.value)),
     )  # fmt: skip
+
+
+def _nothing(name: str, metric: str, reasons: Sequence[tuple[str, int]]) -> str:
+    """What is wrong when no run gives the metric, and what test would."""
+    from hdsim.study.known_procedures import procedures
+
+    why = reasons[0][0].removeprefix(f"{metric}: ") if reasons else "it is no finite number"
+    tests = [one.name for one in procedures().values() if metric in one.metrics]
+    hint = f"; a bench procedure that does: {', '.join(tests)}" if tests else ""
+    return f"no run of {name!r} gives {metric}: {why}{hint}"
 
 
 def _close(good: float, bad: float, precision: float, span: float, logarithmic: bool) -> bool:
@@ -236,7 +274,9 @@ def plot_tolerance(found: Tolerance) -> Figure:
             )  # fmt: skip
         if x[0] > 0 and x[-1] > 10 * x[0]:
             axes.set_xscale("log")
-        lowest, highest = np.nanmin([p.metric for p in probes]), np.nanmax([p.metric for p in probes])
+        every = np.concatenate([p.metric for p in probes])
+        finite = every[np.isfinite(every)]
+        lowest, highest = (float(f(finite)) if len(finite) else found.limit for f in (np.min, np.max))
         room = found.limit - lowest
         if highest > found.limit + 4 * room > found.limit:
             # Far beyond the limit a drive may not work at all; what matters is the way there.

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import copy
 import json
-import math
 import time
 import warnings
 from collections.abc import Sequence
@@ -33,12 +32,12 @@ class Recipe:
 
     Args:
         base: the study's base as JSON: ``scenario`` (complete), or ``procedure`` with its arguments.
-        drive: the base's drive as the user wrote it, as JSON, for another preset.
+        written: the base's drive and effects as the user wrote them, as JSON, for another preset.
         names: the study's parameters, in the order of every run's values.
     """
 
     base: str
-    drive: str
+    written: str
     names: tuple[str, ...]
 
     def data(self, values: Sequence[Any]) -> dict[str, Any]:
@@ -49,19 +48,21 @@ class Recipe:
         """
         given = dict(zip(self.names, values, strict=True))
         remade = {name: v for name, v in given.items() if remakes_base(name)}
-        data: dict[str, Any] = copy.deepcopy(_base(self.base, self.drive, json.dumps(remade, sort_keys=True)))
+        data: dict[str, Any] = copy.deepcopy(
+            _base(self.base, self.written, json.dumps(remade, sort_keys=True))
+        )
         # A choice of type or law goes first: it drops what belongs to the other choice.
         for name in sorted(given, key=lambda n: n.rsplit(".", 1)[-1] not in ("type", "law", "model", "kind")):
             if name not in remade:
                 set_value(data, name, copy.deepcopy(given[name]))
         return data
 
-    def scenario(self, values: Sequence[Any], seed: int, source: str = "run") -> Scenario:
+    def scenario(self, values: Sequence[Any], seed: int | None = None, source: str = "run") -> Scenario:
         """The scenario of a run.
 
         Args:
             values: one for every name.
-            seed: seed of the run, unless ``run.seed`` is a parameter.
+            seed: seed of the run, unless ``run.seed`` is a parameter; the base's own when None.
             source: where errors say that the scenario comes from.
 
         Raises:
@@ -73,7 +74,7 @@ class Recipe:
         from hdsim.scenario.validation import build
 
         data = self.data(values)
-        if "run.seed" not in self.names:
+        if seed is not None and "run.seed" not in self.names:
             data.setdefault("run", {})["seed"] = seed
         return build(Source(data, {(): Mark(source)}), Scenario)
 
@@ -84,7 +85,7 @@ def remakes_base(name: str) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _base(base: str, drive: str, remade: str) -> dict[str, Any]:
+def _base(base: str, written: str, remade: str) -> dict[str, Any]:
     """The base scenario as plain data, remade with another preset or other options."""
     given: dict[str, Any] = json.loads(base)
     changes: dict[str, Any] = json.loads(remade)
@@ -96,7 +97,9 @@ def _base(base: str, drive: str, remade: str) -> dict[str, Any]:
                 f"found the parameter {OPTIONS}{next(iter(options))}, but a scenario has no options"
             )
         if PRESET in changes:
-            data["drive"] = json.loads(drive) | {"preset": changes[PRESET]}
+            before = json.loads(written)
+            data["drive"] = before["drive"] | {"preset": changes[PRESET]}
+            data["effects"] = before["effects"]
         return data
     from hdsim.study.known_procedures import find_procedure
 
@@ -210,21 +213,19 @@ def record(scenario: Scenario, log: Path | None = None) -> tuple[Recording, str]
 
 
 def measured(names: Sequence[str], recording: Recording, scenario: Scenario) -> tuple[dict[str, float], str]:
-    """Metrics of a run, and why those that are missing could not be taken."""
-    from hdsim.study.known_metrics import find_metric
+    """Metrics of a run (a time that never comes is infinite), and why those that are missing could not be
+    taken.
+    """
+    from hdsim.study.run_metrics import RunMetrics
 
+    found = RunMetrics(recording, scenario)
     values: dict[str, float] = {}
     reasons: list[str] = []
     for name in names:
         try:
-            value = float(find_metric(name)(recording, scenario))
+            values[name] = found[name].value
         except HdsimError as error:
             reasons.append(f"{name}: {error}")
-        else:
-            if math.isfinite(value):
-                values[name] = value
-            else:
-                reasons.append(f"{name}: found {value}, expected a finite number")
     return values, "; ".join(reasons)
 
 

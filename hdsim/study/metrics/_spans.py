@@ -58,22 +58,27 @@ def one_way_turn(recording: Recording, ratio: float, direction: int) -> slice:
 
 @dataclass(frozen=True)
 class Dwell:
-    """A rest of the commanded angle after a move.
+    """A rest of the commanded angle.
 
     Args:
         samples: where it is in the state table.
         target: commanded angle, rad.
-        move: commanded distance of the move before it, rad, signed.
+        move: commanded distance of the move before it, rad, signed; 0 where the run begins at rest.
     """
 
     samples: slice
     target: float
     move: float
 
-    def attained(self, angle: Array) -> float:
-        """Mean of ``angle`` over the last fifth of the dwell: where the axis came to rest."""
+    @property
+    def last(self) -> slice:
+        """The last fifth of the dwell: where the axis counts as come to rest."""
         start, stop = self.samples.start, self.samples.stop
-        return float(np.mean(angle[stop - max(1, (stop - start) // 5) : stop]))
+        return slice(stop - max(1, (stop - start) // 5), stop)
+
+    def attained(self, angle: Array) -> float:
+        """Mean of ``angle`` over the last fifth of the dwell."""
+        return float(np.mean(angle[self.last]))
 
 
 def dwells(recording: Recording, shortest_s: float = 0.05) -> list[Dwell]:
@@ -81,6 +86,18 @@ def dwells(recording: Recording, shortest_s: float = 0.05) -> list[Dwell]:
 
     Raises:
         InputError: the run has no commanded angle, or no dwell after a move.
+    """
+    found = [dwell for dwell in rests(recording, shortest_s) if dwell.move]
+    if not found:
+        raise InputError("positioning needs a dwell after a move; the commanded angle never rests after one")
+    return found
+
+
+def rests(recording: Recording, shortest_s: float = 0.05) -> list[Dwell]:
+    """Every rest of the commanded angle that lasts at least ``shortest_s``, the one at the start too.
+
+    Raises:
+        InputError: the run has no commanded angle.
     """
     if "reference_angle" not in recording:
         raise InputError("positioning needs a commanded angle: drive the motor with a position command")
@@ -92,13 +109,11 @@ def dwells(recording: Recording, shortest_s: float = 0.05) -> list[Dwell]:
         if time[part.stop - 1] - time[part.start] < shortest_s:
             continue
         target = float(reference[part.stop - 1])
-        if abs(target - before) > 1e-8:
+        move = target - before if abs(target - before) > 1e-8 else 0.0
+        if move or not found:
             # The sample before is the one at which the command arrived.
-            arrived = slice(max(0, part.start - 1), part.stop)
-            found.append(Dwell(arrived, target, target - before))
+            found.append(Dwell(slice(max(0, part.start - 1), part.stop), target, move))
         before = target
-    if not found:
-        raise InputError("positioning needs a dwell after a move; the commanded angle never rests after one")
     return found
 
 
@@ -120,6 +135,8 @@ class Plateau:
 def plateaus(recording: Recording, settle: float = 0.4, shortest_s: float = 0.05) -> list[Plateau]:
     """Stretches of constant speed and load, in order; the first share ``settle`` of each is left out."""
     time, speed, load = recording.time, recording["motor_velocity"], recording["load_torque"]
+    if len(time) < 2:
+        return []
     fast = np.max(np.abs(speed), initial=0.0)
     strong = np.max(np.abs(load), initial=0.0)
     step = np.gradient(time)

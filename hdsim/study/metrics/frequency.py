@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 _TWO_MASS = "peak of twist rate over torque, which a two-mass drive has at sqrt(K (1/J_l + 1/(i^2 J_m)))/2 pi"
 _SPEED = "n = 60 f / order: the order of the kinematic error meets the resonance (Tuttle and Seering 1996)"
 
+#: Least samples of a run whose response is estimated: eight half-overlapping windows of eight samples.
+_SHORTEST = 36
+
 
 @dataclass(frozen=True)
 class FrequencyResponse:
@@ -100,6 +103,8 @@ def frequency_response(
         InputError: the run is shorter than two periods.
     """
     time = recording.time
+    if len(time) < _SHORTEST:
+        raise InputError(f"a frequency response needs {_SHORTEST} samples, found {len(time)}")
     rate = (len(time) - 1) / (time[-1] - time[0])
     if period_s is None:
         from scipy.signal import coherence, csd, welch
@@ -109,6 +114,8 @@ def frequency_response(
         _, cross = csd(given, answer, rate, nperseg=length)
         _, coherent = coherence(given, answer, rate, nperseg=length)
         band = (frequency >= frequencies[0]) & (frequency <= frequencies[-1]) & (frequency > 0.0)
+        if np.count_nonzero(band) < 3:
+            raise InputError("a frequency response needs a longer run: found no three lines in the band")
         return FrequencyResponse(frequency[band], (cross / power)[band], coherent[band])
     samples = round(period_s * rate)
     periods = (len(time) - 1) // samples

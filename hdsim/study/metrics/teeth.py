@@ -100,3 +100,20 @@ def contact_wind_up(recording: Recording, scenario: Scenario) -> float:
     """Penetration at the mean tooth force, at the output, arcsec."""
     force = _largest_force_n(recording, scenario)
     return ARCSEC * float(contact_law(scenario).penetration(force)) / lever_m(scenario)
+
+
+@metric(
+    "tooth_force_max", "N", "largest normal force of any tooth, at run.teeth_rate_hz", f"{_PAPER}, Eq. 13, 14"
+)
+def tooth_force_max(recording: Recording, scenario: Scenario) -> float:
+    """Largest normal force of a tooth in the teeth table, N.
+
+    Raises:
+        InputError: the run kept no forces of teeth.
+    """
+    _mesh(scenario)
+    if "teeth" not in recording.tables:
+        raise InputError(
+            "the load of the teeth needs their forces; this run keeps none (run.teeth_rate_hz: 0)"
+        )
+    return float(np.max(np.abs(recording.tables["teeth"]["normal_force"])))
