@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import PydanticKnownError
 
 from hdsim.actuation._kernels import gravity_arm, load_torque
 from hdsim.actuation.arm import Arm
@@ -42,21 +43,22 @@ class GravityArm(Part):
 class Load(Part):
     """What hangs on the output."""
 
-    inertia_kg_m2: Annotated[float, Number(0.5, far=15.0)] = Field(0.0, ge=0.0)
+    arm: Arm | None = None
+    """A robot arm of which the drive moves one joint."""
+    inertia_kg_m2: Annotated[float, Number(0.5, far=15.0)] = Field(0.0, ge=0.0, validate_default=True)
     """Moment of inertia about the output's axis, beside that of ``arm``; above 0 where there is none. Unit
     kg m^2."""
     torque: TorqueSignal | None = None
     """External torque on the output over time, positive in the direction of positive output angle."""
     gravity: GravityArm | None = None
     """A mass on an arm."""
-    arm: Arm | None = None
-    """A robot arm of which the drive moves one joint."""
 
-    @model_validator(mode="after")
-    def _some_inertia(self) -> Load:
-        if self.arm is None and not self.inertia_kg_m2 > 0.0:
-            raise ValueError("inertia_kg_m2 must be given, above 0, where no arm has it")
-        return self
+    @field_validator("inertia_kg_m2")
+    @classmethod
+    def _some_inertia(cls, value: float, known: ValidationInfo) -> float:
+        if known.data.get("arm", ...) is None and not value > 0.0:
+            raise PydanticKnownError("greater_than", {"gt": 0.0})
+        return value
 
     def over(self, seconds: float) -> tuple[list[Any], float]:
         """The parts of the load, and the moment of inertia that the model has with them, kg m^2.
