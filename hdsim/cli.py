@@ -13,8 +13,8 @@ from hdsim.errors import HdsimError
 #: Where each command lives, and its line in ``hdsim --help``.
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("hdsim.simulation.commands:run", "Simulate a scenario, write its log, draw its figure."),
-    "check": ("hdsim.scenario.commands:check", "Check scenarios and say what they describe."),
-    "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios, for editors."),
+    "check": ("hdsim.scenario.commands:check", "Check scenarios, mappings and studies; say what they are."),
+    "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios or other files."),
     "effects": ("hdsim.scenario.commands:effects", "List the physical effects that a scenario can turn on."),
     "presets": ("hdsim.study.commands:presets", "List the drives that are ready to use."),
     "catalogue": ("hdsim.study.commands:catalogue", "Simulate a preset's catalogue lines; print the errors."),
@@ -38,6 +38,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),
+    "mapping": ("hdsim.log.mapping_commands:mapping", "Draft a mapping of a measured recording."),
     "replay": ("hdsim.live.commands:replay", "Serve a finished log and its layouts to a viewer."),
     "info": ("hdsim.log.commands:info", "Show what is in a log."),
     "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from hdsim.errors import InputError
 from hdsim.log import foreign, naming
+from hdsim.log.clock import seconds, spread
 from hdsim.log.mapping import (
-    TIME_UNITS,
     AngleChannel,
     Channels,
     IntervalMask,
@@ -24,6 +24,8 @@ from hdsim.log.mapping import (
     _Channel,
     side_of,
 )
+from hdsim.log.readers.contract import Numbers, Tell, silent
+from hdsim.log.readers.topics import Samples
 from hdsim.recording import Column, Event, Recording, Table
 
 Array = NDArray[np.float64]
@@ -32,16 +34,17 @@ UNITS = {"angle": "rad", "velocity": "rad/s", "torque": "N m", "temperature": "d
 _TOLD_GAPS = 50
 #: What the name of another joint begins with, beside the channels.
 _JOINT = "joint "
-#: Range of what a constant rate leaves of stamps in whole ticks, in ticks: one, and the rate's own error.
-WHOLE_TICK = 1.05
 
 
-def import_recording(path: str | Path, mapping: str | Path | Mapping | None = None) -> Recording:
+def import_recording(
+    path: str | Path, mapping: str | Path | Mapping | None = None, tell: Tell = silent
+) -> Recording:
     """Read a measured recording into the names and units of our own.
 
     Args:
-        path: a CSV, Parquet or MCAP file, or a ROS 2 bag (its folder).
+        path: a file of one of the formats of `hdsim.log.readers`, or a ROS 2 bag (its folder).
         mapping: a mapping file, or a mapping; None for a log of hdsim, which needs none.
+        tell: hears which share of the file has been read.
 
     Returns:
         A recording whose ``state`` holds what was measured: ``motor_angle``, ``motor_velocity``,
@@ -66,15 +69,16 @@ def import_recording(path: str | Path, mapping: str | Path | Mapping | None = No
         from hdsim.scenario import load_model
 
         mapping = load_model(mapping, Mapping)
-    return _Import(path, mapping).recording()
+    return _Import(path, mapping, tell).recording()
 
 
 class _Import:
     """One recording on its way."""
 
-    def __init__(self, path: Path, mapping: Mapping) -> None:
+    def __init__(self, path: Path, mapping: Mapping, tell: Tell) -> None:
         self.path = path
         self.mapping = mapping
+        self.tell = tell
         self.events: list[Event] = []
         self._first_ns: int | None = None
 
@@ -86,6 +90,9 @@ class _Import:
         time, raw = self._samples(given)
         start = time[0]
         time = time - start
+        for name, channel in given.items():
+            if raw[name].dtype.kind == "M":
+                raise InputError(f"{self.path}: {name}: column {channel.column!r} holds dates, no numbers")
         columns = {name: self._convert(name, channel, raw[name]) for name, channel in given.items()}
         masked = self._mask(time, columns)
         if mapping.ratio is not None and {"motor_angle", "output_angle"} <= set(columns):
@@ -112,7 +119,7 @@ class _Import:
         if clock.column is not None or clock.field is not None:
             time_origin = Origin(column=clock.column, topic=clock.topic, field=clock.field)
             wanted.append(time_origin)
-        found = foreign.read(self.path, mapping, list(dict.fromkeys(wanted)))
+        found = foreign.read(self.path, mapping, list(dict.fromkeys(wanted)), self.tell)
         lead = clock.topic or next(iter(origins.values())).topic or ""
         if lead not in found:
             raise InputError(f"{self.path}: the time's topic {lead!r} gives no channel: name a field of it")
@@ -136,7 +143,7 @@ class _Import:
             raise InputError(f"{self.path}: no row meets the mapping's select")
         return time[keep], {name: rows[origin][keep] for name, origin in origins.items()}
 
-    def _time(self, topic: str, samples: foreign.Samples, recorded: Array | None, *, leads: bool) -> Array:
+    def _time(self, topic: str, samples: Samples, recorded: Numbers | None, *, leads: bool) -> Array:
         """Times of the samples of a topic, in s, strictly increasing."""
         clock = self.mapping.time
         place = f"{self.path}: {topic}" if topic else str(self.path)
@@ -148,9 +155,7 @@ class _Import:
         if clock.rate_hz is not None:
             return np.arange(count) / clock.rate_hz
         if recorded is not None:
-            time = recorded * TIME_UNITS[clock.unit or "s"]
-            if clock.wraps_at is not None:
-                time = np.unwrap(time, period=clock.wraps_at * TIME_UNITS[clock.unit or "s"])
+            time = seconds(recorded, clock.unit or "s", clock.wraps_at, place)
         elif topic:
             time = self._stamped(samples, place, leads)
         else:
@@ -159,7 +164,7 @@ class _Import:
         if len(bad):
             raise InputError(f"{place}: sample {bad[0] + 1} has no time")
         if clock.quantised:
-            return _spread(time, place)
+            return spread(time, place)
         back = np.flatnonzero(np.diff(time) <= 0)
         if len(back):
             k = int(back[0])
@@ -170,7 +175,7 @@ class _Import:
             )
         return time
 
-    def _stamped(self, samples: foreign.Samples, place: str, leads: bool) -> Array:
+    def _stamped(self, samples: Samples, place: str, leads: bool) -> Array:
         """Stamps of messages in s, counted from the first of all topics, which keeps them exact to 1 ns."""
         kind = self.mapping.time.stamp
         stamps = samples.stamps.get(kind)
@@ -282,42 +287,6 @@ def outliers(values: Array, mask: OutlierMask) -> NDArray[np.bool_]:
     quantum = float(np.min(steps[steps > 0], initial=np.inf))
     found: NDArray[np.bool_] = (off > mask.threshold * spread) & (off > 3 * quantum)
     return found
-
-
-def _spread(time: Array, place: str) -> Array:
-    """Times for samples that share one, stretch by stretch between missed ticks of the clock.
-
-    Where one constant rate meets every stamp to a tick, it is that of the samples; else they are spread
-    evenly over the sample number between changes of the clock.
-    """
-    steps = np.diff(time)
-    if (steps < 0).any():
-        k = int(np.flatnonzero(steps < 0)[0])
-        raise InputError(f"{place}: time goes back: sample {k + 2} at {time[k + 1]:.9g} s")
-    if not (steps > 0).any():
-        raise InputError(f"{place}: the clock never advances")
-    tick = float(np.median(steps[steps > 0]))
-    missed = steps > 1.5 * tick
-    stretches = np.split(time, np.flatnonzero(missed) + 1)
-    period = (time[-1] - time[0] - steps[missed].sum()) / max(len(time) - len(stretches), 1)
-    return np.concatenate([_evened(stretch, tick, period) for stretch in stretches])
-
-
-def _evened(time: Array, tick: float, period: float) -> Array:
-    """The times of one stretch; ``period`` is the mean one, for a stretch without a change of the clock."""
-    index = np.arange(len(time), dtype=np.float64)
-    first = np.flatnonzero(np.concatenate([[True], np.diff(time) > 0]))
-    if len(first) < 2:
-        return np.asarray(time[0] + period * index)
-    rate, start = np.polyfit(index, time, 1)
-    rest = time - (start + rate * index)
-    if np.ptp(rest) <= WHOLE_TICK * tick:
-        # A clock that counts whole ticks is late by half of one on the average.
-        return np.asarray(start + rate * index + 0.5 * (rest.min() + rest.max() + tick))
-    # After the last change the mean rate goes on.
-    rate = (time[first[-1]] - time[0]) / first[-1]
-    end = time[first[-1]] + rate * (len(time) - first[-1])
-    return np.asarray(np.interp(index, np.append(first, len(time)), np.append(time[first], end)))
 
 
 def _at(time: Array, other: Array, values: Array) -> Array:

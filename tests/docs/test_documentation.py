@@ -25,6 +25,7 @@ from hdsim.estimate.check import LONGEST_GAP_S, SLOWEST_HZ
 from hdsim.estimate.found import Gap
 from hdsim.estimate.records import FEWEST_SAMPLES, SHORTEST_S
 from hdsim.scenario import Scenario, json_schema
+from hdsim.scenario.commands import KINDS, described
 from hdsim.tell.wording import MUCH_NOISE, MUCH_STRUCTURE, SURE
 
 ROOT = Path(__file__).parents[2]
@@ -119,10 +120,11 @@ def test_the_readme_has_a_whole_scenario() -> None:
     )
 
 
-def test_the_schema_beside_the_scenarios_is_current() -> None:
-    path = ROOT / "scenarios" / "scenario.schema.json"
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_schemas_beside_the_files_are_current(kind: str) -> None:
+    (path,) = (ROOT / "scenarios").rglob(f"{kind}.schema.json")
     stored = json.loads(path.read_text(encoding="utf-8"))
-    assert stored == json.loads(json.dumps(json_schema(Scenario))), "run: make schema"
+    assert stored == json.loads(json.dumps(json_schema(described(kind)))), "run: make schema"
 
 
 def test_the_readme_counts_the_effects() -> None:
