@@ -243,7 +243,8 @@ def _simulated(
     from hdsim.actuation.command import Command
     from hdsim.actuation.loads import Load
     from hdsim.drive.model import Model
-    from hdsim.estimate.predict import MeasuredTorque, PredictionError
+    from hdsim.estimate.known_load import MeasuredTorque
+    from hdsim.estimate.predict import PredictionError
     from hdsim.simulation.run import Run
 
     try:

@@ -32,6 +32,8 @@ from hdsim.recording import Column, Event, Recording, Table
 Array = NDArray[np.float64]
 
 _TOLD_GAPS = 50
+#: What the name of another joint begins with, beside the channels.
+_JOINT = "joint "
 
 
 def import_recording(
@@ -83,6 +85,8 @@ class _Import:
     def recording(self) -> Recording:
         mapping = self.mapping
         given = mapping.channels.given()
+        joints: dict[str, _Channel] = {_JOINT + name: channel for name, channel in mapping.joints.items()}
+        given |= joints
         time, raw = self._samples(given)
         start = time[0]
         time = time - start
@@ -95,9 +99,13 @@ class _Import:
             columns["transmission_error"] = columns["output_angle"] - columns["motor_angle"] / mapping.ratio
         gaps = self._gaps(time)
         self._tell(given, masked)
-        table = Table(time, {name: _column(name, values) for name, values in columns.items()})
+        turned = {name: columns.pop(name) for name in joints}
+        tables = {"state": Table(time, {name: _column(name, values) for name, values in columns.items()})}
+        if turned:
+            named = {name.removeprefix(_JOINT): Column(v, "rad", "measured") for name, v in turned.items()}
+            tables["joints"] = Table(time, named)
         return Recording(
-            {"state": table},
+            tables,
             events=sorted(self.events, key=lambda event: event.time),
             metadata=self._metadata(float(start), gaps),
         )

@@ -300,6 +300,8 @@ class Mapping(Form):
     """Time of the samples."""
     channels: Channels
     """What was measured."""
+    joints: dict[str, AngleChannel] = {}
+    """Angles of other joints of the same arm, by their names in its URDF; the side has no meaning."""
     select: tuple[Select, ...] = ()
     """Conditions that a row must meet, all of them."""
     longest_gap_s: float | None = Field(None, gt=0)

@@ -15,11 +15,12 @@ if TYPE_CHECKING:
 def build_model(scenario: Scenario) -> Model:
     """The scenario's drive with its effects, load and commands, as an ODE."""
     drive = scenario.drive
+    loads, inertia = scenario.load.over(scenario.run.duration_s)
     motions: dict[str, object] = {m.axis: m.signal for m in scenario.command.motions(drive.ratio)}
     return Model(
         drive,
-        [*scenario.effects.active().values(), scenario.load, scenario.command],
-        load_inertia_kg_m2=scenario.load.inertia_kg_m2,
+        [*scenario.effects.active().values(), *loads, scenario.command],
+        load_inertia_kg_m2=inertia,
         motions=motions,
         seed=scenario.run.seed,
     )

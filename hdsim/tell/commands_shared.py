@@ -45,6 +45,11 @@ def measured_options(command: F) -> F:
                 help="Whether torque sensors have one zero in all records, or one in each [campaign].",
             ),
             click.option("--force", is_flag=True, help="Go on in spite of errors in the data."),
+            click.option(
+                "--black-box",
+                is_flag=True,
+                help="Also say what boosted trees leave of the held-out data (hdsim[baseline]).",
+            ),
         )
     ):
         command = option(command)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hdsim.diagnose.evidence import PlaceEvidence
-    from hdsim.diagnose.orders import Line
+    from hdsim.estimate.orders import Line
     from hdsim.estimate.records import Array
     from hdsim.tell.findings import Compared, Findings
 

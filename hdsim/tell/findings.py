@@ -16,10 +16,10 @@ import numpy as np
 
 from hdsim.diagnose.coordinates import coordinates
 from hdsim.diagnose.evidence import Evidence, LawEvidence, PlaceEvidence, StageEvidence
-from hdsim.diagnose.orders import Line, order_lines
 from hdsim.diagnose.rules import RULES
 from hdsim.diagnose.verdict import Remainder, Verdict
 from hdsim.diagnose.workflow import LEAST_REST
+from hdsim.estimate.orders import Line, order_lines
 from hdsim.estimate.prove import held_out_gap
 
 if TYPE_CHECKING:

@@ -7,12 +7,12 @@ from diagnose_bench import rigid_record, scenario
 
 import hdsim
 from hdsim.diagnose.name import simplest_first
-from hdsim.diagnose.orders import order_lines
 from hdsim.diagnose.verdict import Verdict
 from hdsim.diagnose.workflow import diagnose
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.numbers import GAIN_PRIOR
+from hdsim.estimate.orders import order_lines
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Record

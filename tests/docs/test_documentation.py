@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -77,6 +78,7 @@ def test_scenarios_in_the_documentation_are_valid(text: str, tmp_path: Path) -> 
     data = YAML(typ="safe").load(text)
     base = (ROOT / "scenarios" / "seed_move.yaml").read_text(encoding="utf-8")
     (tmp_path / "base.yaml").write_text(base, encoding="utf-8")
+    shutil.copy(ROOT / "scenarios/arms/six_joint.urdf", tmp_path)  # what an arm is read from
     if "extends" not in data and not {"drive", "command", "load", "run"} <= set(data):
         text = f"extends: base.yaml\n{text}"  # an excerpt
     path = tmp_path / "example.yaml"

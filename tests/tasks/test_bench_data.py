@@ -372,7 +372,7 @@ def test_what_is_open_is_asked_on_a_terminal_and_listed_elsewhere(
         (["--set", "time.unit=min"], "expected s, ms, us, ns"),
         (["--set", "time.column=clock"], "no column 'clock'"),
         (["--set", "output_angle [deg].unit=rpm"], "expected rad, mrad, deg"),
-        (["--set", "motor_torque [mNm].unit=kNm"], "expected N m, mN m, N cm, A, mA"),
+        (["--set", "motor_torque [mNm].unit=kNm"], "expected N m, mN m, N cm, kN m, lbf in, lbf ft, A, mA"),
         (["--set", "output_angle [deg].side=left"], "expected motor or output"),
         (["--axis", "3"], "a.csv holds one axis"),
         (["--set", "speed.unit=rpm"], "no column 'speed'"),
