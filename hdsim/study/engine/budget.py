@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from hdsim.errors import HdsimError, InputError
 from hdsim.study.engine.causes import Cause, causes
-from hdsim.study.engine.execute import InProcess
+from hdsim.simulation.ensemble import InProcess
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -200,6 +200,8 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
     """
     from hdsim.drive import _layout
     from hdsim.scenario.model import Scenario
+    from hdsim.simulation.ensemble import record_at_once
+    from hdsim.simulation.run import RunFailed
     from hdsim.simulation.setup import build_run
 
     whole = Scenario.model_validate(json.loads(text))
@@ -220,12 +222,10 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
                 model.teeth.close_gaps(numbers)
             elif cause.name == "kinematic_error":
                 model.teeth.remove_pitch_errors(numbers)
-    recording = run.record()
-    if run.interrupted is not None:
-        raise run.interrupted
-    if run.failure:
-        raise HdsimError(f"with only {', '.join(on) or 'nothing'} on, the run stopped early: {run.failure}")
-    return recording, scenario
+    try:
+        return record_at_once(run), scenario
+    except RunFailed as error:
+        raise HdsimError(f"with only {', '.join(on) or 'nothing'} on, the run stopped early: {error}") from error
 
 
 def plot_budget(budget: Budget) -> Figure:

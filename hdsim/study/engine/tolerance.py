@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from hdsim.errors import InputError
 from hdsim.study.engine.definition import Base, Study, ValueList
 from hdsim.study.engine.design import run_seed
-from hdsim.study.engine.execute import InProcess, batches, execute
+from hdsim.simulation.ensemble import InProcess
+from hdsim.study.engine.execute import batches, execute
 from hdsim.study.engine.worker import Job, Row
 
 if TYPE_CHECKING:
