@@ -1,9 +1,9 @@
 """Many runs that differ in their numbers: each in one compiled call, side by side in threads, processes or
 on a cluster.
 
-The compiled call lets go of the interpreter, so that threads fill the cores. Which executor makes the runs, and
-how many at a time, makes no difference to any number: a run has its own model, and its steps are those of
-``Run``.
+The compiled call lets go of the interpreter, so that threads fill the cores. Which executor makes the runs,
+and how many at a time, makes no difference to any number: a run has its own model, and its steps are those
+of ``Run``.
 """
 
 from __future__ import annotations
@@ -117,11 +117,19 @@ def simulate_all(
         InputError: there is no such channel.
         RunFailed: a run stopped early.
     """
-    one = partial(_channels, channels=tuple(channels))
     if pool is None:
-        return in_order(one, scenarios, threads)
-    found = dict(as_completed(one, scenarios, pool, threads))
+        return in_order(partial(_channels, channels=tuple(channels)), scenarios, threads)
+    # As plain data: classes of a scenario's sections are made as they are needed, and cannot be pickled.
+    data = (scenario.model_dump(mode="json") for scenario in scenarios)
+    found = dict(as_completed(partial(_channels_of, channels=tuple(channels)), data, pool, threads))
     return [found[index] for index in range(len(scenarios))]
+
+
+def _channels_of(data: dict[str, Any], channels: tuple[str, ...]) -> dict[str, Array]:
+    """Channels of one run of a scenario that comes as plain data."""
+    from hdsim.scenario import Scenario
+
+    return _channels(Scenario.model_validate(data), channels)
 
 
 def _channels(scenario: Scenario, channels: tuple[str, ...]) -> dict[str, Array]:
@@ -186,7 +194,7 @@ class _Computed(Recording):
         if run.teeth_every and run.model.teeth is not None:
             self.tables["teeth"] = _Later(self, "teeth")
         self.static = run.static()
-        self.metadata = {}
+        self.metadata, self.sensitivities = {}, {}
 
     @cached_property
     def coordinates(self) -> dict[str, Array]:
@@ -201,8 +209,9 @@ class _Computed(Recording):
         first = 0
         for last in self._ends:
             if last - first >= self._run.block or last == self._ends[-1] > first:
-                part = [values[first:last] for values in self._samples]
-                for name, table in self._run.tables(*part, np.zeros(last - first))[0].items():
+                times, states, inside = (values[first:last] for values in self._samples)
+                tables, _ = self._run.tables(times, states, inside, np.zeros(last - first))
+                for name, table in tables.items():
                     parts.setdefault(name, []).append(table)
                 first = last
         return {name: joined(tables) for name, tables in parts.items()}

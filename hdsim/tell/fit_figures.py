@@ -78,7 +78,9 @@ def left_figure(found: Estimation) -> Figure | None:
             chosen.setdefault(series.channel, k)
     if not chosen:
         return None
-    residuals = {stage: bench.residuals(found.predictions[stage], drift=True) for stage in ("before", "after")}
+    residuals = {
+        stage: bench.residuals(found.predictions[stage], drift=True) for stage in ("before", "after")
+    }
     with rc_context(style.STYLE):
         figure = Figure(figsize=(WIDTH, 0.6 + 1.5 * len(chosen)), layout="constrained")
         grid = figure.subplots(len(chosen), 1, squeeze=False)[:, 0]

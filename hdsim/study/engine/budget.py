@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import HdsimError, InputError
-from hdsim.study.engine.causes import Cause, causes
 from hdsim.simulation.ensemble import InProcess
+from hdsim.study.engine.causes import Cause, causes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -225,7 +225,9 @@ def _run(text: str, on: tuple[str, ...]) -> tuple[Recording, Scenario]:
     try:
         return record_at_once(run), scenario
     except RunFailed as error:
-        raise HdsimError(f"with only {', '.join(on) or 'nothing'} on, the run stopped early: {error}") from error
+        raise HdsimError(
+            f"with only {', '.join(on) or 'nothing'} on, the run stopped early: {error}"
+        ) from error
 
 
 def plot_budget(budget: Budget) -> Figure:

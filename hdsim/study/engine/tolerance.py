@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.simulation.ensemble import InProcess
 from hdsim.study.engine.definition import Base, Study, ValueList
 from hdsim.study.engine.design import run_seed
-from hdsim.simulation.ensemble import InProcess
 from hdsim.study.engine.execute import batches, execute
 from hdsim.study.engine.worker import Job, Row
 

@@ -199,6 +199,7 @@ def record(scenario: Scenario, log: Path | None = None) -> tuple[Recording, str]
         log.parent.mkdir(parents=True, exist_ok=True)
         done = simulate_to_log(scenario, log)
         return open_log(log), done.failure or ""
+    from hdsim.recording import Recording
     from hdsim.simulation.ensemble import record_at_once
     from hdsim.simulation.run import RunFailed
     from hdsim.simulation.setup import build_run
@@ -207,8 +208,7 @@ def record(scenario: Scenario, log: Path | None = None) -> tuple[Recording, str]
     try:
         return record_at_once(build_run(scenario)), ""
     except RunFailed as error:
-        assert error.recording is not None
-        return error.recording, str(error)
+        return error.recording or Recording({}), str(error)
 
 
 def measured(names: Sequence[str], recording: Recording, scenario: Scenario) -> tuple[dict[str, float], str]:
