@@ -31,7 +31,7 @@ _A11, _A12, _A21, _A22 = 5.0 / 12.0, -1.0 / 12.0, 0.75, 0.25
 
 @_jit
 def _pushes(address, t, y, own, lists, others, shared, scratch, kept, other, spare, dfdt, push):  # type: ignore[no-untyped-def]
-    """Differences of the others' right-hand sides from the model's ``own`` at (t, y), computed just before."""
+    """Differences of the others' right-hand sides from the model's ``own``, computed just before."""
     first = shared[0, 0]
     for i in range(len(kept)):
         kept[i] = scratch[first + i]
