@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hdsim.log.importing import import_recording
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
+    from hdsim.simulation.ensemble import simulate_all
     from hdsim.simulation.linear import io_system, linearize
     from hdsim.simulation.simulate import simulate
 
@@ -38,6 +39,7 @@ __all__ = [
     "load_scenario",
     "open_log",
     "simulate",
+    "simulate_all",
 ]
 
 # Loaded when first used: importing hdsim imports neither numpy nor numba.
@@ -50,6 +52,7 @@ _HOMES = {
     "linearize": "hdsim.simulation.linear",
     "open_log": "hdsim.log",
     "simulate": "hdsim.simulation.simulate",
+    "simulate_all": "hdsim.simulation.ensemble",
 }
 
 

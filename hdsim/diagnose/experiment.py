@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -20,7 +19,7 @@ from hdsim.diagnose.experiments import Experiment, experiments, limits_of
 from hdsim.diagnose.further import Candidate, NextExperiment
 from hdsim.diagnose.separation import noise_of, separated
 from hdsim.errors import InputError
-from hdsim.estimate.bench import THREADS, Bench
+from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import LEAD_IN_S
 from hdsim.estimate.records import Array
@@ -168,6 +167,8 @@ def _repetition(bench: Bench) -> Experiment:
 
 def _outcomes(bench: Bench, tried: Sequence[Experiment], fits: Mapping[str, Fit]) -> list[Outcome]:
     """Simulate experiments under all candidates and all small changes of their numbers."""
+    from hdsim.simulation.ensemble import in_order
+
     noise = noise_of(bench, next(iter(fits.values())))
     rate = min(RATE_HZ, _rate(bench))
     plans = {name: _steps(fit) for name, fit in fits.items()}
@@ -179,8 +180,7 @@ def _outcomes(bench: Bench, tried: Sequence[Experiment], fits: Mapping[str, Fit]
             if shifted is not None:
                 jobs.append((shifted[0], fit.state))
     channels = list(noise)
-    with ThreadPoolExecutor(THREADS) as pool:
-        done = iter(list(pool.map(lambda job: _simulated(job[0], job[1], channels, rate), jobs)))
+    done = iter(in_order(lambda job: _simulated(job[0], job[1], channels, rate), jobs))
     found = []
     for experiment in tried:
         shifted = experiment.shifted()
