@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "estimate"))
 import arm_plant as plant
 
 import hdsim
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.records import Record
 
 #: Names that count as right; the friction of a rigid drive acts on either side alike.

@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 import hdsim
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.records import Record
 
 #: Aims, processor seconds.

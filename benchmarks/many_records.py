@@ -55,7 +55,7 @@ def swing(seed: int) -> Any:
 def one(task: str, count: int) -> None:
     """Do a task with so many records and print what it took."""
     import hdsim
-    from hdsim.diagnose.workflow import diagnose
+    from hdsim.diagnosis.workflow import diagnose
     from hdsim.scenario import Scenario
 
     scenario = Scenario.model_validate(MODEL)

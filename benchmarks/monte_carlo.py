@@ -23,10 +23,10 @@ ROUNDS = 5
 
 
 def main(runs: int) -> int:
-    from hdsim.study.engine.execute import batches, execute, executor
-    from hdsim.study.engine.reading import load_study, plan
-    from hdsim.study.engine.study import run_study
-    from hdsim.study.engine.worker import Job, run_batch
+    from hdsim.studies.engine.execute import batches, execute, executor
+    from hdsim.studies.engine.reading import load_study, plan
+    from hdsim.studies.engine.study import run_study
+    from hdsim.studies.engine.worker import Job, run_batch
 
     study = load_study(STUDY).study
     checked = plan(study.model_copy(update={"sampling": study.sampling.model_copy(update={"samples": runs})}))

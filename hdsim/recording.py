@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hdsim.scenario import Scenario
-    from hdsim.study import RunMetrics
+    from hdsim.studies import RunMetrics
 
 Array = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ class Recording:
         Raises:
             InputError: the recording carries no scenario and none is given.
         """
-        from hdsim.study import metrics_of
+        from hdsim.studies import metrics_of
 
         return metrics_of(self, scenario)
 

@@ -18,7 +18,7 @@ from hdsim.reproduce.rows import Row, Verdict, check
 from hdsim.surface.flank import Flank
 
 if TYPE_CHECKING:
-    from hdsim.study.engine.budget import Budget
+    from hdsim.studies.engine.budget import Budget
 
 Array = NDArray[np.float64]
 
@@ -70,8 +70,8 @@ def _cost(drive: Mapping[str, Any], effects: Mapping[str, Any] | None = None) ->
     from hdsim.contact.law import ValidityWarning
     from hdsim.contact.majumdar_bhushan import MajumdarBhushan
     from hdsim.simulation.simulate import simulate
-    from hdsim.study.known_procedures import find_procedure
-    from hdsim.study.metrics.teeth import contact_law
+    from hdsim.studies.known_procedures import find_procedure
+    from hdsim.studies.metrics.teeth import contact_law
 
     names = ("backlash", "lost_motion", "hysteresis_loss", "contact_wind_up", "tooth_contact_stiffness")
     with warnings.catch_warnings():
@@ -115,8 +115,8 @@ def without_gap() -> Cost:
 @cache
 def positioning() -> Budget:
     """Positioning error under load, at the worst of four targets from both sides, split into its causes."""
-    from hdsim.study.engine.budget import error_budget
-    from hdsim.study.known_procedures import find_procedure
+    from hdsim.studies.engine.budget import error_budget
+    from hdsim.studies.known_procedures import find_procedure
 
     scenario = find_procedure("positioning").build(
         _drive({}), effects=_EFFECTS, cycles=2, targets=4, load_torque_nm=LOAD_NM, run={"rtol": 1e-4}
@@ -128,7 +128,7 @@ def positioning() -> Budget:
 def kinematic_error() -> float:
     """Transmission error over one output turn without load, peak to peak, arcsec."""
     from hdsim.simulation.simulate import simulate
-    from hdsim.study.known_procedures import find_procedure
+    from hdsim.studies.known_procedures import find_procedure
 
     scenario = find_procedure("transmission_error").build(_drive({}), effects=_EFFECTS, run={"rtol": 1e-4})
     return simulate(scenario).metrics(scenario)["transmission_accuracy"].value
@@ -138,7 +138,7 @@ def wind_up() -> tuple[float, float]:
     """Wind-up of the whole drive at rated torque, and the bending of the teeth in it, arcsec."""
     from hdsim.drive.parameters import Drive, TeethMesh
     from hdsim.drive.spring import catalogue_wind_up
-    from hdsim.study.metrics._spans import ARCSEC
+    from hdsim.studies.metrics._spans import ARCSEC
 
     drive = Drive.model_validate(_drive({}))
     assert isinstance(drive.mesh, TeethMesh)

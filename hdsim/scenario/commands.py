@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 KINDS = {
     "scenario": "hdsim.scenario.model:Scenario",
     "mapping": "hdsim.log.mapping:Mapping",
-    "study": "hdsim.study.engine.definition:Study",
-    "loadcycle": "hdsim.study.selection:LoadCycle",
+    "study": "hdsim.studies.engine.definition:Study",
+    "loadcycle": "hdsim.studies.selection:LoadCycle",
 }
 
 
@@ -55,14 +55,14 @@ def _checked(file: str) -> tuple[str, list[str]]:
 
         return load_model(file, Mapping).summary(), []
     if keys & {"metrics", "base", "parameters"}:
-        from hdsim.study.engine.reading import load_study
+        from hdsim.studies.engine.reading import load_study
 
         plan = load_study(file)
         varied = f"varies {', '.join(plan.units)}" if plan.units else "varies nothing"
         measured = ", ".join(metric.name for metric in plan.metrics)
         return f"  study of {len(plan.runs)} runs: {varied}\n  measures {measured}", []
     if "phases" in keys:
-        from hdsim.study.selection import load_cycle
+        from hdsim.studies.selection import load_cycle
 
         return f"  load cycle of {len(load_cycle(file).phases)} phases", []
     from hdsim.scenario.doubts import doubts

@@ -115,7 +115,7 @@ def tell_numbers(recording: Recording, scenario: Scenario) -> None:
     from rich.table import Table
 
     from hdsim.console import console
-    from hdsim.study.engineering import engineering_rows, told_events
+    from hdsim.studies.engineering import engineering_rows, told_events
 
     table = Table()
     table.add_column("quantity")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from hdsim.diagnose.decide import Reason
+from hdsim.diagnosis.decide import Reason
 from hdsim.tell.words import below, percent, short, started, times
 
 Side = Literal["at least", "at most", "more than", ""]

@@ -9,7 +9,7 @@ from hdsim.estimate.found import Gap
 from hdsim.tell.words import short, spoken, unit_of
 
 if TYPE_CHECKING:
-    from hdsim.diagnose.verdict import Verdict
+    from hdsim.diagnosis.verdict import Verdict
 
 
 def last_model(verdict: Verdict) -> str:

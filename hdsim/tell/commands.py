@@ -28,7 +28,7 @@ def diagnose(
     Checks the data, compares, fits the model's own numbers, locates what is left, names effects of the
     catalogue, adds them, and proves it on data that no fit has seen.
     """
-    from hdsim.diagnose.workflow import diagnose as run
+    from hdsim.diagnosis.workflow import diagnose as run
     from hdsim.tell.findings import gather
     from hdsim.tell.save import save
     from hdsim.tell.terminal import Progress, show

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.further import CurveFound
-    from hdsim.diagnose.verdict import Verdict
+    from hdsim.diagnosis.further import CurveFound
+    from hdsim.diagnosis.verdict import Verdict
     from hdsim.estimate.found import Gap
     from hdsim.estimate.records import Array, Mask
     from hdsim.tell.findings import Compared, Findings

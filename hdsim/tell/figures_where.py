@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.evidence import PlaceEvidence
+    from hdsim.diagnosis.evidence import PlaceEvidence
     from hdsim.estimate.orders import Line
     from hdsim.estimate.records import Array
     from hdsim.tell.findings import Compared, Findings

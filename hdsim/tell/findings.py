@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdsim.diagnose.coordinates import coordinates
-from hdsim.diagnose.evidence import Evidence, LawEvidence, PlaceEvidence, StageEvidence
-from hdsim.diagnose.rules import RULES
-from hdsim.diagnose.verdict import Remainder, Verdict
-from hdsim.diagnose.workflow import LEAST_REST
+from hdsim.diagnosis.coordinates import coordinates
+from hdsim.diagnosis.evidence import Evidence, LawEvidence, PlaceEvidence, StageEvidence
+from hdsim.diagnosis.rules import RULES
+from hdsim.diagnosis.verdict import Remainder, Verdict
+from hdsim.diagnosis.workflow import LEAST_REST
 from hdsim.estimate.orders import Line, order_lines
 from hdsim.estimate.prove import held_out_gap
 
 if TYPE_CHECKING:
-    from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.diagnosis.workflow import Diagnosis
     from hdsim.estimate.records import Array, Mask
 
 

@@ -12,7 +12,7 @@ from hdsim.log.mapping import MEASURED
 from hdsim.recording import Column, Event, Recording, Table
 
 if TYPE_CHECKING:
-    from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.diagnosis.workflow import Diagnosis
 
 
 LOG, LAYOUT = "compared.mcap", "diagnose.json"

@@ -21,7 +21,7 @@ from hdsim.tell.words import short, spoken
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from hdsim.diagnose.verdict import Verdict
+    from hdsim.diagnosis.verdict import Verdict
 
 #: Dots an inch of the figures: sharp on screens with small pixels.
 DPI = 160

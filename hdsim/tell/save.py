@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hdsim.diagnose.following import next_experiment
+from hdsim.diagnosis.following import next_experiment
 from hdsim.estimate.write import scenario_text
 from hdsim.tell.findings import Findings, gather
 from hdsim.tell.record_out import write_compared
@@ -14,7 +14,7 @@ from hdsim.tell.staging import staged
 from hdsim.tell.words import title_of
 
 if TYPE_CHECKING:
-    from hdsim.diagnose.workflow import Diagnosis
+    from hdsim.diagnosis.workflow import Diagnosis
 
 
 def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Findings | None = None) -> Path:

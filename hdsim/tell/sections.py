@@ -7,10 +7,10 @@ from collections.abc import Collection
 from itertools import zip_longest
 from pathlib import Path
 
-from hdsim.diagnose.name import LEAST_SHARE
-from hdsim.diagnose.rules import RULES
-from hdsim.diagnose.screen import LEVEL
-from hdsim.diagnose.verdict import Verdict
+from hdsim.diagnosis.name import LEAST_SHARE
+from hdsim.diagnosis.rules import RULES
+from hdsim.diagnosis.screen import LEVEL
+from hdsim.diagnosis.verdict import Verdict
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import numbers_table, section, table
 from hdsim.tell.words import percent, short, shown, spoken, started, titles_of

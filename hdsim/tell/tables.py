@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hdsim.diagnose.verdict import Verdict
+from hdsim.diagnosis.verdict import Verdict
 from hdsim.estimate.found import FittedNumber
 from hdsim.tell.words import named_number, short, shown, spoken, unit_of
 

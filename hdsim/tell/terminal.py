@@ -16,7 +16,7 @@ from hdsim.tell.words import odds, percent, title_of
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from hdsim.diagnose.verdict import Verdict
+    from hdsim.diagnosis.verdict import Verdict
 
 #: How far a diagnosis is, in percent, when it says that it begins with this. Locating and naming are repeated
 #: as long as something is found, so that the bar waits there.

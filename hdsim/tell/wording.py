@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from hdsim.diagnose.rules import RULES
-from hdsim.diagnose.screen import LEVEL
-from hdsim.diagnose.verdict import NamedEffect, Verdict
+from hdsim.diagnosis.rules import RULES
+from hdsim.diagnosis.screen import LEVEL
+from hdsim.diagnosis.verdict import NamedEffect, Verdict
 from hdsim.estimate.found import FittedNumber
 from hdsim.tell.because import weighings
 from hdsim.tell.findings import Findings

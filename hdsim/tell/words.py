@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hdsim.diagnose.verdict import NamedEffect
+from hdsim.diagnosis.verdict import NamedEffect
 from hdsim.estimate.found import Gap
 from hdsim.plot import units
 from hdsim.scenario.fields import split_unit

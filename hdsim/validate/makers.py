@@ -13,7 +13,7 @@ import numpy as np
 from hdsim.validate.rows import Row, check
 
 if TYPE_CHECKING:
-    from hdsim.study.registry import BenchRun
+    from hdsim.studies.registry import BenchRun
 
 _LLC = "Harmonic Drive LLC, CSF/CSG catalogue"
 _CHA = "Harmonic Drive AG, CHA manual 1018854, p. 54, size 20"
@@ -22,8 +22,8 @@ _PRESET = "csg-20-100"
 
 @cache
 def _bench(procedure: str) -> BenchRun:
-    from hdsim.study.bench.report import CATALOGUE_EFFECTS, run_procedure
-    from hdsim.study.known_procedures import find_procedure
+    from hdsim.studies.bench.report import CATALOGUE_EFFECTS, run_procedure
+    from hdsim.studies.known_procedures import find_procedure
 
     drive = {"preset": _PRESET}
     return run_procedure(find_procedure(procedure), drive, effects=CATALOGUE_EFFECTS)[0]
@@ -42,7 +42,7 @@ _LINES = {
 @check(*_LINES)
 def upper_limits(_: Path | None) -> Iterator[Row]:
     """The lines of the catalogue that are upper limits."""
-    from hdsim.study.known_metrics import find_metric
+    from hdsim.studies.known_metrics import find_metric
 
     for name, (procedure, metric, quantity, limit, fitted) in _LINES.items():
         run = _bench(procedure)
@@ -65,8 +65,8 @@ def upper_limits(_: Path | None) -> Iterator[Row]:
 def stiffness(_: Path | None) -> Iterator[Row]:
     """Secants of the torsion cycle with hysteresis on."""
     from hdsim.drive.presets import catalogue_figures
-    from hdsim.study.bench.report import STIFFNESS
-    from hdsim.study.known_metrics import find_metric
+    from hdsim.studies.bench.report import STIFFNESS
+    from hdsim.studies.known_metrics import find_metric
 
     run, figures = _bench("torsion"), catalogue_figures(_PRESET)
     printed = (figures.stiffness_k1, figures.stiffness_k2, figures.stiffness_k3)
@@ -91,8 +91,8 @@ _WIND_UP = {
 def wind_up(_: Path | None) -> Iterator[Row]:
     """Angle at T1 with all teeth, the centre of a torsion cycle, ratio 50."""
     from hdsim.simulation.simulate import simulate
-    from hdsim.study.bench import torsion
-    from hdsim.study.metrics.torsion import torsion_loop
+    from hdsim.studies.bench import torsion
+    from hdsim.studies.metrics.torsion import torsion_loop
 
     for size, (printed, tolerance) in _WIND_UP.items():
         scenario = torsion.build({"preset": f"csg-{size}-50"})
@@ -109,8 +109,8 @@ def wind_up(_: Path | None) -> Iterator[Row]:
 @check("efficiency-part-load")
 def efficiency_at_part_load(_: Path | None) -> Iterator[Row]:
     """Efficiency at 57 % of rated torque over that at rated torque."""
-    from hdsim.study.bench import friction
-    from hdsim.study.catalogue import lumped, measured
+    from hdsim.studies.bench import friction
+    from hdsim.studies.catalogue import lumped, measured
 
     def efficiency(share: float) -> float:
         return measured(
@@ -147,7 +147,7 @@ def bearing_life(_: Path | None) -> Iterator[Row]:
     from hdsim.drive.parameters import Drive
     from hdsim.drive.ratings import ratings
     from hdsim.scenario import Scenario
-    from hdsim.study.catalogue import lumped, measured
+    from hdsim.studies.catalogue import lumped, measured
 
     made = Drive.model_validate(lumped(_PRESET))
 

@@ -99,7 +99,7 @@ def stick_slip(_data: Path | None) -> Iterator[Row]:
 @check("resonance")
 def two_mass_resonance(_data: Path | None) -> Iterator[Row]:
     """The torsional mode with the motor free."""
-    from hdsim.study.catalogue import resonance
+    from hdsim.studies.catalogue import resonance
 
     simulated, analytic = resonance("csg-20-100", 0.5)
     yield Row(
@@ -112,8 +112,8 @@ def two_mass_resonance(_data: Path | None) -> Iterator[Row]:
 def _strongest_order(preset: str, low: float, high: float) -> float:
     """Order per motor turn of the strongest line of the transmission error that random pitch errors make."""
     from hdsim.simulation.simulate import simulate
-    from hdsim.study.bench import transmission
-    from hdsim.study.metrics.transmission import transmission_error
+    from hdsim.studies.bench import transmission
+    from hdsim.studies.metrics.transmission import transmission_error
 
     drive = {"preset": preset, "mesh": {"pitch_error_m": 2e-6}}
     scenario = transmission.build(drive, run={"rtol": 1e-4})

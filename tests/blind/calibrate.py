@@ -1,4 +1,4 @@
-"""Weights of ``hdsim.diagnose.rules`` from stored cases: logistic regression of "the name is right".
+"""Weights of ``hdsim.diagnosis.rules`` from stored cases: logistic regression of "the name is right".
 
 Each effect that a search added is one example: what its evidence says (``decide.weighed``, at unit weights)
 against whether it, or its group, is among the truth's. The prior of each weight is what stands in ``Rules``,
@@ -14,9 +14,9 @@ import numpy as np
 from judging import MOST_NAMES, Line, borne_out
 from scipy.optimize import minimize
 
-from hdsim.diagnose.decide import decide, weighed
-from hdsim.diagnose.evidence import Evidence
-from hdsim.diagnose.rules import RULES, Rules
+from hdsim.diagnosis.decide import decide, weighed
+from hdsim.diagnosis.evidence import Evidence
+from hdsim.diagnosis.rules import RULES, Rules
 
 #: Weights that are fitted, in the order in which ``weighed`` uses them, and their prior's standard deviation.
 WEIGHTS = (

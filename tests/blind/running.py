@@ -21,7 +21,7 @@ from contract import AbsentError, Case, Measured
 from judging import Line, closed, covered
 
 import hdsim
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.records import Record
 from hdsim.scenario import Scenario
 

@@ -8,7 +8,7 @@ from calibrate import judged_again
 from judging import groups
 from running import KEPT, lines_of
 
-from hdsim.diagnose.rules import RULES
+from hdsim.diagnosis.rules import RULES
 
 PAGE = Path(__file__).parents[2] / "docs" / "blind.md"
 

@@ -12,7 +12,7 @@ from diagnose_bench import BASE, rigid_record, scenario
 from mcap.writer import Writer
 
 from hdsim.cli import main
-from hdsim.diagnose import workflow
+from hdsim.diagnosis import workflow
 from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
 from hdsim.tell.staging import staged

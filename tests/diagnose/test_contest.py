@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
 
-from hdsim.diagnose.contest import _linear, _Point, contest
-from hdsim.diagnose.search import left_of
-from hdsim.diagnose.traces import screen
+from hdsim.diagnosis.contest import _linear, _Point, contest
+from hdsim.diagnosis.search import left_of
+from hdsim.diagnosis.traces import screen
 from hdsim.estimate.fit import sharpened
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.orders import order_lines

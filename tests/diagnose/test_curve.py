@@ -8,12 +8,12 @@ import pytest
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.curve import fit_curve
-from hdsim.diagnose.curve_fit import effect, unit_traces
-from hdsim.diagnose.curve_kinds import Kind
-from hdsim.diagnose.locate import Location, locate
-from hdsim.diagnose.penalised import penalised, roughness
-from hdsim.diagnose.screen import Residual
+from hdsim.diagnosis.curve import fit_curve
+from hdsim.diagnosis.curve_fit import effect, unit_traces
+from hdsim.diagnosis.curve_kinds import Kind
+from hdsim.diagnosis.locate import Location, locate
+from hdsim.diagnosis.penalised import penalised, roughness
+from hdsim.diagnosis.screen import Residual
 from hdsim.effects.table import Table
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.predict import predictors

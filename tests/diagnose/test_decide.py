@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hdsim.diagnose.decide import decide, weighed
-from hdsim.diagnose.evidence import Evidence, HeldOutEvidence, LawEvidence, RestEvidence
-from hdsim.diagnose.rules import RULES, Rules
+from hdsim.diagnosis.decide import decide, weighed
+from hdsim.diagnosis.evidence import Evidence, HeldOutEvidence, LawEvidence, RestEvidence
+from hdsim.diagnosis.rules import RULES, Rules
 
 
 def law(name: str = "kinematic_error", **changes) -> LawEvidence:

@@ -5,7 +5,7 @@ from click.testing import CliRunner
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.verdict import Verdict
+from hdsim.diagnosis.verdict import Verdict
 from hdsim.recording import Column, Recording, Table
 from hdsim.tell.commands import diagnose
 

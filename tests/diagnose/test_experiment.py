@@ -8,9 +8,9 @@ from diagnose_bench import BASE
 from ruamel.yaml import YAML
 
 import hdsim
-from hdsim.diagnose.experiment import propose
-from hdsim.diagnose.experiments import Limits, experiments
-from hdsim.diagnose.separation import separated
+from hdsim.diagnosis.experiment import propose
+from hdsim.diagnosis.experiments import Limits, experiments
+from hdsim.diagnosis.separation import separated
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench

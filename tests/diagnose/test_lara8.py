@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import hdsim
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.records import Record
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "lara8-joint3-dual-encoder" / "joint3.csv"

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hdsim
-from hdsim.diagnose.following import next_experiment
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.following import next_experiment
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.errors import InputError
 from hdsim.estimate.records import Record
 from hdsim.tell.words import title_of

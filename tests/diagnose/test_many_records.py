@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hdsim
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.offsets import offsets_of
 from hdsim.estimate.records import Record
 

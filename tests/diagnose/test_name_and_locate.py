@@ -6,9 +6,9 @@ import pytest
 from diagnose_bench import rigid_record, scenario
 
 import hdsim
-from hdsim.diagnose.name import simplest_first
-from hdsim.diagnose.verdict import Verdict
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.name import simplest_first
+from hdsim.diagnosis.verdict import Verdict
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.numbers import GAIN_PRIOR

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hdsim.diagnose.late import age_by_lines
+from hdsim.diagnosis.late import age_by_lines
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.orders import order_lines
 from hdsim.estimate.predict import predictors

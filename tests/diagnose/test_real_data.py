@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import hdsim
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.records import record_from
 
 ROOT = Path(__file__).parents[2]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
 
-from hdsim.diagnose.revise import NEEDLESS, needed, revised
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.revise import NEEDLESS, needed, revised
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.refit import together
 
 

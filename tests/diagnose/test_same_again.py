@@ -17,7 +17,7 @@ import numpy as np
 from diagnose_bench import rigid_record, scenario
 from threadpoolctl import threadpool_info
 
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.estimation import estimate
 
 model = scenario(Path(sys.argv[1]))

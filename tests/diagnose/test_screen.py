@@ -1,6 +1,6 @@
 import numpy as np
 
-from hdsim.diagnose.screen import Residual, chance_of
+from hdsim.diagnosis.screen import Residual, chance_of
 
 N, BLOCKS = 4000, 40
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from diagnose_bench import motion, rigid_record, scenario
 
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.effects import catalogue
 from hdsim.estimate.predict import Predictor, plan_for
 from hdsim.estimate.records import Record

@@ -8,7 +8,7 @@ from diagnose_bench import rigid_record, scenario
 from test_real_data import KINOVA, ROOT
 
 import hdsim
-from hdsim.diagnose import workflow
+from hdsim.diagnosis import workflow
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import check_record

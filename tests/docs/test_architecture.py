@@ -127,7 +127,7 @@ def test_imports_go_the_way_of_the_page(name: str) -> None:
 
 
 def test_the_decision_sees_evidence_and_rules_alone() -> None:
-    pure = {f"hdsim.diagnose.{name}" for name in ("decide", "evidence", "rules")}
+    pure = {f"hdsim.diagnosis.{name}" for name in ("decide", "evidence", "rules")}
     seen = {name for module in pure for name in graph()[module]}
     assert seen <= pure | {"hdsim.estimate.found"}
 

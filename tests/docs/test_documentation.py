@@ -17,9 +17,9 @@ from ruamel.yaml import YAML
 
 import hdsim
 from hdsim.cli import COMMANDS
-from hdsim.diagnose.experiments import LONGEST_S
-from hdsim.diagnose.following import WEAK
-from hdsim.diagnose.verdict import NamedEffect, Verdict
+from hdsim.diagnosis.experiments import LONGEST_S
+from hdsim.diagnosis.following import WEAK
+from hdsim.diagnosis.verdict import NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.estimate.check import LONGEST_GAP_S, SLOWEST_HZ
 from hdsim.estimate.found import Gap

@@ -19,7 +19,7 @@ from hdsim.effects import catalogue
 ROOT = Path(__file__).parents[2]
 NAME = "eddy_current_brake"
 #: Rooms whose code is about effects in general.
-GENERAL = ("drive", "scenario", "estimate", "diagnose", "tell")
+GENERAL = ("drive", "scenario", "estimate", "diagnosis", "tell")
 #: The curve of what has no name, and the readings of all channels: parts of how a model is told and read.
 KNOWN = {"table", "sensors"}
 
@@ -70,7 +70,7 @@ def test_one_file_is_named_by_a_diagnosis(folder: Path) -> None:
     code = f"""
 from pathlib import Path
 from diagnose_bench import rigid_record, scenario
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 
 def brake(angle, velocity):
     output = velocity / 100.0

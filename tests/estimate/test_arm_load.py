@@ -5,7 +5,7 @@ import pytest
 
 import hdsim
 from hdsim.cli import main
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.records import record_from
 
 pytest.importorskip("mujoco")

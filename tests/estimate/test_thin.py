@@ -89,7 +89,7 @@ def test_means_keep_the_numbers_and_the_verdict(tmp_path):
     sys.path.insert(0, str(Path(__file__).parents[1] / "diagnose"))
     import diagnose_bench as bench
 
-    from hdsim.diagnose.workflow import diagnose
+    from hdsim.diagnosis.workflow import diagnose
 
     kept, bench.RATE = bench.RATE, 4000.0
     try:

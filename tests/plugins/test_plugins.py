@@ -20,7 +20,7 @@ from pydantic import Field
 from hdsim.actuation.controllers import Controller, PositionPD
 from hdsim.contact.constant import ConstantStiffness
 from hdsim.parts import Parameters
-from hdsim.study.registry import metric
+from hdsim.studies.registry import metric
 
 
 class Soft(Parameters):
@@ -129,7 +129,7 @@ def test_a_scenario_takes_all_of_them(folder: Path) -> None:
 import hdsim
 from hdsim.drive.parameters import Drive
 from hdsim.scenario import Scenario, json_schema
-from hdsim.study.known_metrics import measure
+from hdsim.studies.known_metrics import measure
 scenario = hdsim.load_scenario("all.yaml")
 assert scenario.drive.rated_torque_nm == 33
 assert measure(["top_speed"], hdsim.simulate(scenario), scenario)["top_speed"] > 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hdsim.study.engine.definition import Base, Study
+from hdsim.studies.engine.definition import Base, Study
 
 #: One motor turn in 0.2 s; with order 2 the transmission error is A sin(2 theta), peak to peak 2 A.
 SCENARIO: dict[str, Any] = {

@@ -13,14 +13,14 @@ from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
 from hdsim.scenario.settings import Evaluation
 from hdsim.simulation.simulate import simulate
-from hdsim.study.bench import frequency, friction, positioning, settling, torsion, transmission
-from hdsim.study.bench.report import CATALOGUE_EFFECTS, catalogue_lines, figures_of, run_procedure
-from hdsim.study.commands import bench, presets
-from hdsim.study.known_metrics import find_metric, metrics
-from hdsim.study.known_procedures import find_procedure, procedures
-from hdsim.study.metrics.friction import operating_points
-from hdsim.study.metrics.positioning import approaches, positioning_errors
-from hdsim.study.registry import BenchRun
+from hdsim.studies.bench import frequency, friction, positioning, settling, torsion, transmission
+from hdsim.studies.bench.report import CATALOGUE_EFFECTS, catalogue_lines, figures_of, run_procedure
+from hdsim.studies.commands import bench, presets
+from hdsim.studies.known_metrics import find_metric, metrics
+from hdsim.studies.known_procedures import find_procedure, procedures
+from hdsim.studies.metrics.friction import operating_points
+from hdsim.studies.metrics.positioning import approaches, positioning_errors
+from hdsim.studies.registry import BenchRun
 
 ACCURACY = Path(__file__).parents[2] / "docs" / "accuracy.md"
 ARCSEC = 180 * 3600 / math.pi
@@ -151,7 +151,7 @@ def test_the_resonance_is_that_of_two_masses(excite) -> None:
 
 
 def test_the_frequency_response_is_that_of_a_locked_mass_on_its_spring() -> None:
-    from hdsim.study.metrics.frequency import excitation, frequency_response
+    from hdsim.studies.metrics.frequency import excitation, frequency_response
 
     scenario = frequency.build(FRICTIONLESS, excite="output", amplitude_nm=0.02)
     recording = simulate(scenario)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from hdsim.study.catalogue import catalogue_table
+from hdsim.studies.catalogue import catalogue_table
 
 
 @pytest.mark.parametrize("preset", ["seed-2021", "csg-20-100"])

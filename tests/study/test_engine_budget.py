@@ -6,12 +6,12 @@ from engine_cases import SCENARIO
 
 from hdsim.scenario import Scenario
 from hdsim.simulation.simulate import simulate
-from hdsim.study.engine.budget import error_budget
-from hdsim.study.engine.budget_plot import plot_budget
-from hdsim.study.engine.causes import causes
-from hdsim.study.engine.definition import Base, Study, ValueList
-from hdsim.study.engine.reading import plan
-from hdsim.study.engine.study import run_study
+from hdsim.studies.engine.budget import error_budget
+from hdsim.studies.engine.budget_plot import plot_budget
+from hdsim.studies.engine.causes import causes
+from hdsim.studies.engine.definition import Base, Study, ValueList
+from hdsim.studies.engine.reading import plan
+from hdsim.studies.engine.study import run_study
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 ARCSEC = math.degrees(1) * 3600

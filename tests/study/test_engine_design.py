@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 from scipy import stats
 
-from hdsim.study.engine.definition import Variation
-from hdsim.study.engine.design import drive_seed, quantile, runs, sampled
+from hdsim.studies.engine.definition import Variation
+from hdsim.studies.engine.design import drive_seed, quantile, runs, sampled
 
 INERTIA, STIFFNESS = "load.inertia_kg_m2", "drive.torsion.damping_nm_s_per_rad"
 

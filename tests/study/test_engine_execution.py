@@ -10,11 +10,11 @@ import pytest
 from engine_cases import AMPLITUDE, METRIC, TOOTHED, study
 
 from hdsim.errors import InputError
-from hdsim.study.engine.execute import batches, execute, executor
-from hdsim.study.engine.reading import plan
-from hdsim.study.engine.study import JOURNAL, run_study
-from hdsim.study.engine.table import study_table
-from hdsim.study.engine.worker import Job
+from hdsim.studies.engine.execute import batches, execute, executor
+from hdsim.studies.engine.reading import plan
+from hdsim.studies.engine.study import JOURNAL, run_study
+from hdsim.studies.engine.table import study_table
+from hdsim.studies.engine.worker import Job
 
 PITCH = "drive.mesh.pitch_error_m"
 
@@ -126,7 +126,7 @@ def test_cut_or_torn_last_line_is_made_again(tmp_path, damage):
 
 def test_file_in_use_is_refused(tmp_path):
     pytest.importorskip("fcntl")
-    from hdsim.study.engine.journal import Journal
+    from hdsim.studies.engine.journal import Journal
 
     with Journal(tmp_path / JOURNAL, "key"), pytest.raises(InputError, match="in use"):
         Journal(tmp_path / JOURNAL, "key")
@@ -177,7 +177,7 @@ parameters:
 sampling: {type: random, samples: 120}
 metrics: [transmission_error_peak_to_peak, transmission_error_rms]
 """
-COMMAND = "import sys; from hdsim.study.commands_engine import study; study()"
+COMMAND = "import sys; from hdsim.studies.commands_engine import study; study()"
 
 
 def command(path, folder, *more):

@@ -4,8 +4,8 @@ import pytest
 from engine_cases import AMPLITUDE, METRIC, study
 
 from hdsim.scenario import Scenario, ScenarioError
-from hdsim.study.engine.names import check, known_names, parse, set_value, unit
-from hdsim.study.engine.reading import load_study, plan
+from hdsim.studies.engine.names import check, known_names, parse, set_value, unit
+from hdsim.studies.engine.reading import load_study, plan
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 

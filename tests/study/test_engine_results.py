@@ -6,11 +6,11 @@ import pytest
 from engine_cases import AMPLITUDE, METRIC, SCENARIO, TOOTHED, study
 from scipy import stats
 
-from hdsim.study.engine.plots import study_figures, swings
-from hdsim.study.engine.reading import plan
-from hdsim.study.engine.sensitivity import indices
-from hdsim.study.engine.study import run_study, write_results
-from hdsim.study.engine.summary import mean_interval, quantile_interval, summarise
+from hdsim.studies.engine.plots import study_figures, swings
+from hdsim.studies.engine.reading import plan
+from hdsim.studies.engine.sensitivity import indices
+from hdsim.studies.engine.study import run_study, write_results
+from hdsim.studies.engine.summary import mean_interval, quantile_interval, summarise
 
 INERTIA, SECOND = "load.inertia_kg_m2", "effects.kinematic_error.components[1].amplitude_arcmin"
 TWO = {

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hdsim.study.engine.shapley import coalitions, drawn_orders, shapley_shares
+from hdsim.studies.engine.shapley import coalitions, drawn_orders, shapley_shares
 
 
 def test_the_glove_game():

@@ -3,8 +3,8 @@ from engine_cases import AMPLITUDE, METRIC, SCENARIO, TOOTHED
 
 from hdsim.errors import InputError
 from hdsim.scenario import Scenario
-from hdsim.study.engine.definition import Base
-from hdsim.study.engine.tolerance import find_tolerance, plot_tolerance
+from hdsim.studies.engine.definition import Base
+from hdsim.studies.engine.tolerance import find_tolerance, plot_tolerance
 
 
 def find(scenario=SCENARIO, **given):

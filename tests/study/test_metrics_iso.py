@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from hdsim.errors import InputError
-from hdsim.study.metrics.iso import (
+from hdsim.studies.metrics.iso import (
     half_range,
     iso_230_2,
     iso_9283_angle_repeatability,

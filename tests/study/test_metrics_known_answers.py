@@ -9,10 +9,10 @@ from hdsim.drive.parameters import Drive
 from hdsim.errors import InputError
 from hdsim.recording import Column, Recording, Table
 from hdsim.simulation.simulate import simulate
-from hdsim.study.bench import torsion, transmission
-from hdsim.study.known_metrics import find_metric
-from hdsim.study.metrics.torsion import torsion_loop
-from hdsim.study.metrics.transmission import orders, transmission_error
+from hdsim.studies.bench import torsion, transmission
+from hdsim.studies.known_metrics import find_metric
+from hdsim.studies.metrics.torsion import torsion_loop
+from hdsim.studies.metrics.transmission import orders, transmission_error
 
 ARCSEC = 180 * 3600 / math.pi
 SEED = {"preset": "seed-2021"}

@@ -9,7 +9,7 @@ import pytest
 from hdsim.errors import InputError
 from hdsim.scenario import Scenario
 from hdsim.simulation.simulate import simulate
-from hdsim.study.known_metrics import find_metric
+from hdsim.studies.known_metrics import find_metric
 
 NAMES = ("average_load_torque", "average_input_speed", "bearing_life", "ratcheting_safety", "buckling_safety")
 

@@ -9,7 +9,7 @@ import hdsim
 from hdsim.errors import InputError
 from hdsim.recording import Event, Recording
 from hdsim.scenario import Scenario
-from hdsim.study.engineering import engineering_rows, told_events
+from hdsim.studies.engineering import engineering_rows, told_events
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 DATA = {

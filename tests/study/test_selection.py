@@ -11,7 +11,7 @@ from hdsim.cli import main
 from hdsim.scenario import json_schema
 from hdsim.scenario.problems import ScenarioError
 from hdsim.scenario.reader import flatten, read_node
-from hdsim.study.selection import LoadCycle, load_cycle, select
+from hdsim.studies.selection import LoadCycle, load_cycle, select
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "loadcycles"
 EXAMPLE = FOLDER / "maker_example.yaml"

@@ -12,7 +12,7 @@ from diagnose_bench import rigid_record, scenario
 from telling import NASTY
 
 import hdsim
-from hdsim.diagnose.workflow import Diagnosis, diagnose
+from hdsim.diagnosis.workflow import Diagnosis, diagnose
 from hdsim.tell.findings import Findings, gather
 from hdsim.tell.save import save
 

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from hdsim.diagnose.decide import decide
-from hdsim.diagnose.evidence import (
+from hdsim.diagnosis.decide import decide
+from hdsim.diagnosis.evidence import (
     CandidateEvidence,
     Evidence,
     HeldOutEvidence,
@@ -12,7 +12,7 @@ from hdsim.diagnose.evidence import (
     RestEvidence,
     StageEvidence,
 )
-from hdsim.diagnose.verdict import NamedEffect, Verdict
+from hdsim.diagnosis.verdict import NamedEffect, Verdict
 from hdsim.estimate.found import Gap
 from hdsim.tell.findings import Findings
 from hdsim.tell.report import write_report

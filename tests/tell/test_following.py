@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 import hdsim
-from hdsim.diagnose.following import NOTHING, candidates
-from hdsim.diagnose.verdict import Verdict
+from hdsim.diagnosis.following import NOTHING, candidates
+from hdsim.diagnosis.verdict import Verdict
 from hdsim.tell.save import save
 
 

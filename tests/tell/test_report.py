@@ -13,9 +13,9 @@ from diagnose_bench import rigid_record, scenario
 from telling import NASTY, page
 
 import hdsim
-from hdsim.diagnose.further import Candidate, CurveFound, NextExperiment
-from hdsim.diagnose.verdict import NamedEffect
-from hdsim.diagnose.workflow import diagnose
+from hdsim.diagnosis.further import Candidate, CurveFound, NextExperiment
+from hdsim.diagnosis.verdict import NamedEffect
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.found import DataProblem, FittedNumber
 from hdsim.log import read_attachments
 from hdsim.log.info import info_log

@@ -8,9 +8,9 @@ import pytest
 from rich.console import Console
 from telling import EFFECT, KINDS, NOTHING, UNKNOWN, law, page, stage, told
 
-from hdsim.diagnose.decide import Reason, decide
-from hdsim.diagnose.evidence import Evidence, HeldOutEvidence
-from hdsim.diagnose.rules import RULES
+from hdsim.diagnosis.decide import Reason, decide
+from hdsim.diagnosis.evidence import Evidence, HeldOutEvidence
+from hdsim.diagnosis.rules import RULES
 from hdsim.estimate.found import Gap
 from hdsim.tell.because import WORDINGS, conditions, weighings, wording
 from hdsim.tell.terminal import show

@@ -20,9 +20,9 @@ from telling import (
     told,
 )
 
-from hdsim.diagnose.evidence import HeldOutEvidence
-from hdsim.diagnose.further import CurveFound
-from hdsim.diagnose.verdict import Remainder
+from hdsim.diagnosis.evidence import HeldOutEvidence
+from hdsim.diagnosis.further import CurveFound
+from hdsim.diagnosis.verdict import Remainder
 from hdsim.estimate.found import FittedNumber
 from hdsim.tell.wording import farthest, headline, meaning, much_left, sureness
 

@@ -1,0 +1,162 @@
+"""The evidence of a search, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hdsim.diagnosis.evidence import (
+    Evidence,
+    HeldOutEvidence,
+    LawEvidence,
+    PlaceEvidence,
+    RestEvidence,
+    StageEvidence,
+)
+from hdsim.diagnosis.locate import SHARP, Location
+from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.search import Search, Stage
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.found import Gap
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.prove import borne_out
+from hdsim.estimate.records import Array
+from hdsim.estimate.refit import Refit
+from hdsim.estimate.state import Added, State
+
+#: Places of a stage that are kept.
+PLACES = 12
+
+
+def collect(
+    bench: Bench,
+    base: Refit,
+    found: Search,
+    gap: Mapping[str, Gap],
+    predictions: Mapping[str, Sequence[Array]],
+) -> Evidence:
+    """All that a verdict may rest on.
+
+    Args:
+        bench: the measured series.
+        base: the re-fit.
+        found: what the search found.
+        gap: held-out gaps of the model as given, re-fitted and with all effects.
+        predictions: of all series by these three models.
+    """
+    last = found.stages[-1].location
+    explained = bench.power(base.fit.predictions) - bench.power(found.fit.predictions)
+    left = last.structured * found.left.power
+    slope, spread = borne_out(bench, predictions) if found.named else (1.0, 0.0)
+    return Evidence(
+        stages=[_stage(stage) for stage in found.stages],
+        laws=[
+            _law(
+                one,
+                found.fit.state.added[k],
+                found.stages,
+                explained if len(found.named) == 1 else one.worth,
+                _own_held(bench, found.fit.state, k, predictions["after"]),
+            )
+            for k, one in enumerate(found.named)
+        ],
+        explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
+        left=last.structured,
+        left_chance=last.chance,
+        held=HeldOutEvidence(slope=slope, spread=min(spread, 1e6)),
+        rest=_rest(bench, found.fit.predictions),
+        fell=max((1.0 - g.refit / g.before for g in gap.values() if g.before > 0), default=0.0),
+        moved=[i.name for i in base.moved],
+    )
+
+
+def _stage(stage: Stage) -> StageEvidence:
+    location = stage.location
+    return StageEvidence(
+        title=stage.title,
+        power=stage.power,
+        structured=location.structured,
+        structured_chance=location.chance,
+        chance=stage.screening.chance if stage.screening else 1.0,
+        places=[
+            PlaceEvidence(
+                coordinate=place.coordinate,
+                channel=place.channel,
+                share=place.share,
+                power=place.share * location.powers[place.channel],
+            )
+            for place in location.places[:PLACES]
+        ],
+        candidates=stage.named.candidates if stage.named else [],
+        named=stage.named.name if stage.named else "",
+    )
+
+
+def _own_held(bench: Bench, state: State, k: int, predictions: Sequence[Array]) -> HeldOutEvidence | None:
+    """What held-out data say of one effect beside all others."""
+    less = replace(state, added=(*state.added[:k], *state.added[k + 1 :]))
+    try:
+        slope, spread = borne_out(
+            bench, {"refit": bench.predict(less, everything=True), "after": predictions}
+        )
+    except PredictionError:
+        return None
+    return HeldOutEvidence(slope=slope, spread=min(spread, 1e6))
+
+
+def _law(
+    one: Named, added: Added, stages: Sequence[Stage], worth: float, held: HeldOutEvidence | None
+) -> LawEvidence:
+    own = max(_own(added, stages[-1].location), 0.0)
+    return LawEvidence(
+        name=one.name,
+        group=list(one.group),
+        chance=one.chance,
+        sampled=one.confidence,
+        gain=one.gain,
+        # Sharp lines are no part of what smooth effects have left.
+        needed=max(one.needed, one.of_lines) if added.lives_in[0] == SHARP else one.needed,
+        own_left=own / max(own + max(worth, 0.0), 1e-300),
+        own_first=_own_first(added, stages[-1].location),
+        exact=catalogue()[one.name].signature.exact,
+        at_limit=added.at_limit,
+        sharp=added.lives_in[0] == SHARP,
+        held=held,
+    )
+
+
+def _own_first(added: Added, location: Location) -> bool:
+    """Whether an effect's own coordinate holds more than any other of what is left in its channels."""
+    channels = catalogue()[added.effect].signature.channels
+    places = [place for place in location.places if place.channel in channels]
+    best = max(places, key=lambda place: place.share * location.powers[place.channel], default=None)
+    return best is None or best.coordinate == added.lives_in[0]
+
+
+def _own(added: Added, location: Location) -> float:
+    """Whitened power of a residual that lives in an effect's own coordinate, in its channels."""
+    signature = catalogue()[added.effect].signature
+    found: dict[str, float] = {}
+    for place in location.places:
+        if place.coordinate == added.lives_in[0] and place.channel in signature.channels:
+            power = place.share * location.powers[place.channel]
+            found[place.channel] = max(found.get(place.channel, 0.0), power)
+    return sum(found.values())
+
+
+def _rest(bench: Bench, predictions: Sequence[Array]) -> RestEvidence | None:
+    """The training channel that is left with most beyond its noise."""
+    worst: RestEvidence | None = None
+    for series, residual in zip(bench.series, bench.residuals(predictions, drift=True), strict=True):
+        if series.record >= bench.training or not series.train.any() or series.noise <= 0:
+            continue
+        # In units of a single reading's noise, however many a sample is the mean of.
+        beyond = float(np.mean(residual[series.train] ** 2)) - series.noise**2
+        times = float(np.sqrt(max(1.0 + beyond / series.reading**2, 0.0)))
+        if worst is None or times > worst.times_noise:
+            name = bench.predictors[series.record].record.name
+            worst = RestEvidence(record=name, channel=series.channel, times_noise=times)
+    return worst

@@ -1,0 +1,166 @@
+"""The verdict from the evidence: a pure function of it and of the rules.
+
+Every name is a hypothesis whose log odds of being right are the sum of what each piece of evidence says
+(Good 1950, Probability and the Weighing of Evidence); a name is given where it is more likely right than the
+rules ask. Where something is there and no name is, it is ``unknown``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from hdsim.diagnosis.evidence import Evidence, HeldOutEvidence
+from hdsim.diagnosis.rules import RULES, Rules
+from hdsim.estimate.found import Part
+
+Kind = Literal["nothing", "parameter", "effect", "unknown"]
+
+
+class Reason(Part):
+    """One rule with what was seen."""
+
+    rule: str
+    """What is asked."""
+    of: str = ""
+    """Of which effect; empty: of the whole."""
+    seen: float
+    """What was seen."""
+    limit: float | None = None
+    """The rule's number, where it is a limit."""
+    odds: float | None = None
+    """What it adds to the logarithm of the odds, where it weighs."""
+    holds: bool
+    """Whether it speaks for the verdict."""
+
+
+class Decision(Part):
+    """What the evidence amounts to."""
+
+    kind: Kind
+    """The verdict."""
+    names: list[int] = []
+    """Which of the evidence's effects are believed."""
+    confidence: list[float] = []
+    """Probability that each of the evidence's effects is right, itself or its group."""
+    certainty: float
+    """Probability that the verdict is right: its first name's, or that of there being none to give."""
+    because: list[Reason] = []
+    """Every rule that was asked, with what was seen."""
+
+
+def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
+    """What the evidence amounts to.
+
+    Args:
+        evidence: all that was found out.
+        rules: the numbers by which it is weighed.
+    """
+    because: list[Reason] = []
+    confidence = [probability(evidence, k, rules, because) for k in range(len(evidence.laws))]
+    names = [k for k, p in enumerate(confidence) if p >= rules.believed]
+    for k, p in enumerate(confidence):
+        name = evidence.laws[k].name
+        because.append(
+            Reason(rule="likely enough for a name", of=name, seen=p, limit=rules.believed, holds=k in names)
+        )
+    if names:
+        return Decision(
+            kind="effect",
+            names=names,
+            confidence=confidence,
+            certainty=confidence[names[0]],
+            because=because,
+        )
+    found = bool(evidence.laws)
+    structured = evidence.left_chance <= rules.chance and evidence.left >= rules.structured
+    left = evidence.rest.times_noise if evidence.rest is not None else 0.0
+    for rule, seen, limit, holds in (
+        ("structure is left by chance", evidence.left_chance, rules.chance, structured),
+        ("part of what is left that is structure", evidence.left, rules.structured, structured),
+        ("what is left, in units of the noise", left, rules.rest, left > rules.rest),
+    ):
+        because.append(Reason(rule=rule, seen=seen, limit=limit, holds=holds))
+    if found or structured or left > rules.rest:
+        certainty = (1.0 - max(confidence, default=0.0)) * rules.unknown
+        return Decision(kind="unknown", confidence=confidence, certainty=certainty, because=because)
+    fell = evidence.fell >= rules.fall
+    because.append(
+        Reason(rule="the re-fit closes a held-out gap", seen=evidence.fell, limit=rules.fall, holds=fell)
+    )
+    kind: Kind = "parameter" if fell else "nothing"
+    return Decision(kind=kind, confidence=confidence, certainty=rules.nothing, because=because)
+
+
+def probability(evidence: Evidence, k: int, rules: Rules, because: list[Reason]) -> float:
+    """Probability that an effect of the evidence, or its group, is right.
+
+    Args:
+        evidence: all that was found out.
+        k: which effect.
+        rules: the weights.
+        because: reasons are appended.
+    """
+    total = rules.odds
+    for name, seen, weight in weighed(evidence, k, rules):
+        total += weight
+        because.append(Reason(rule=name, of=evidence.laws[k].name, seen=seen, odds=weight, holds=weight >= 0))
+    return 1.0 / (1.0 + math.exp(-total))
+
+
+def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, float]]:
+    """Each piece of evidence on an effect: what it is, what was seen, its weight in log odds."""
+    law = evidence.laws[k]
+    # What is left elsewhere than in its own coordinate is another effect's, and counts half.
+    seen = 0.5 * (_log_odds(evidence.explained) + _log_odds(1.0 - law.own_left))
+    explained = rules.explained * (seen - _log_odds(rules.explained_even))
+    # Beside others each is asked what held-out data show of its own.
+    held_out = law.held if k and law.held is not None else evidence.held
+    held = rules.held * _held(held_out, rules)
+    found = [
+        # What all explain together speaks for the first; of a later one it only says that all are too little.
+        (
+            "part of the structure that the names explain",
+            evidence.explained,
+            min(explained, 0.0) if k else explained,
+        ),
+        ("held-out data show the promised change", held_out.slope, min(held, 0.0) if k else held),
+        ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
+    ]
+    left = law.own_left
+    if law.exact and law.own_first:
+        left = evidence.left if evidence.left_chance <= rules.chance else 0.0
+    found.append(
+        (
+            "part of the structure in its own coordinate that it leaves",
+            left,
+            (rules.own_left_exact if law.exact else rules.own_left) * left,
+        )
+    )
+    if law.at_limit:
+        found.append(("a number stands at the end of its range", 1.0, rules.limit))
+    if k > 0:
+        if not (law.sharp and law.held is not None and _repeats(law.held, rules)):
+            # A sharp line that data hold which no step has seen is none that the search has chosen of many.
+            found.append(("one more effect", float(k), rules.later))
+        found.append(
+            ("part of what would be missing without it", law.needed, rules.needed * _log_odds(law.needed))
+        )
+    return found
+
+
+def _repeats(held: HeldOutEvidence, rules: Rules) -> bool:
+    """Whether held-out data show a change by itself beyond chance, and more of it than none."""
+    return held.slope > 0.5 and held.slope > rules.repeats * held.spread
+
+
+def _held(held: HeldOutEvidence, rules: Rules) -> float:
+    """Log odds of "all of the promised change is there" against "none is", by its held-out slope."""
+    variance = held.spread**2 + rules.held_mismatch**2
+    odds = (2.0 * held.slope - 1.0) / (2.0 * variance)
+    return float(min(max(odds, -rules.held_against), rules.held_for))
+
+
+def _log_odds(part: float, least: float = 0.02) -> float:
+    part = min(max(part, least), 1.0 - least)
+    return math.log(part / (1.0 - part))

@@ -1,0 +1,340 @@
+"""Steps 4 to 6 in turn: locate, name, add, until nothing significant is left.
+
+The first names are given while other effects are still missing, so each is asked again once there are
+several: the model without it, but with all others, is screened anew, and the best effect there takes its
+place or, when nothing significant is missing there, none does. The torques' delays are fitted when nothing
+more is found, and all is asked once more when they have explained something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hdsim.diagnosis.late import read_late
+from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
+from hdsim.diagnosis.name import LEAST_SHARE, SAME, Named, name_effect
+from hdsim.diagnosis.revise import revised, without
+from hdsim.diagnosis.screen import LEVEL, Residual
+from hdsim.diagnosis.traces import Screening, ranked_anew, screen
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, sharpened
+from hdsim.estimate.orders import Line, order_lines, power_of
+from hdsim.estimate.records import Array
+from hdsim.estimate.refit import align, reweigh, together, with_delays
+from hdsim.estimate.unwound import unwound
+
+#: Most effects that one diagnosis adds, and most passes that it makes.
+MOST_EFFECTS, MOST_STAGES = 4, 7
+#: Part of what a channel lacked at first that a later effect must explain: where no smooth curve over the
+#: coordinates of the effects before it does (a sharp line in an order spectrum is that small), and where one
+#: would, because no formula is exact.
+BEYOND_GAIN, WITHIN_GAIN = 0.005, 0.1
+#: Part of what is left that makes it the next effect's, even in the coordinates of those that are there.
+MOST = 0.5
+#: Part of what is left by which it must have fallen for the last name to be asked again.
+NEWS = 0.1
+
+#: Share of resampled records that a name must have won not to be asked again because of a far smaller one.
+CLEAR = 0.995
+
+Step = Callable[[str], object]
+
+
+@dataclass
+class Stage:
+    """One pass of locate and name."""
+
+    title: str
+    location: Location
+    power: float
+    screening: Screening | None = None
+    named: Named | None = None
+
+
+@dataclass
+class Search:
+    """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit."""
+
+    fit: Fit
+    left: Residual
+    stages: list[Stage] = field(default_factory=list)
+    named: list[Named] = field(default_factory=list)
+
+
+def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Search:
+    """Add effects until nothing significant is left.
+
+    Args:
+        bench: the measured series, weighed.
+        base: the re-fitted model.
+        during: told the step that begins and what it does; returns who is told the details.
+    """
+    found = Search(base, left_of(bench, base))
+    while True:
+        following = _next(bench, base, found, during)
+        if following is not None:
+            found.fit = following
+            continue
+        late = with_delays(bench, found.fit, rough=True)
+        if late is None:
+            return _settled(bench, base, found, during)
+        noise = sum(bench.noise_powers.values())
+        left, now = (bench.power(each.predictions) - noise for each in (found.fit, late))
+        found.fit = late
+        if now > (1.0 - NEWS) * left or len(found.stages) == MOST_STAGES:
+            return _settled(bench, base, found, during)
+        # What a delay has blurred may show now.
+        align(bench, found.fit)
+        reweigh(bench, found.fit)
+
+
+def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Search:
+    """The search's last fit carried on to its optimum, without needless names, with the covariance there."""
+    found.fit = together(bench, found.fit)
+    if found.named:
+        tell = during("again", "asking for each name beside the others")
+        count = len(found.named)
+        found.fit = revised(bench, found.fit, found.named, tell)
+        if 1 < len(found.named) < count:
+            # Beside a name that was needless others may have been wrong.
+            found.fit = together(bench, _again(bench, base, found.fit, found, tell, every=True))
+            found.fit = revised(bench, found.fit, found.named, tell)
+        for one in found.named:
+            for other in found.named:
+                one.group.pop(other.name, None)  # what is there by itself is no other name of this
+        # What is left is what this fit leaves, not the rough one before it.
+        found.left = left_of(bench, found.fit)
+        last = found.stages[-1]
+        last.location = locate(bench, found.left, bench.residuals(found.fit.predictions, drift=True))
+        last.power = found.left.power
+    return found
+
+
+def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Fit | None:
+    """The model with one more effect; None when nothing significant is left, or nothing that matters."""
+    current = found.fit = read_late(bench, found.fit)
+    title = "refit" if not found.named else f"with {found.named[-1].name}"
+    during("locate", f"locating what is left {title}")
+    found.left = left_of(bench, current)
+    stage = Stage(
+        title, locate(bench, found.left, bench.residuals(current.predictions, drift=True)), found.left.power
+    )
+    found.stages.append(stage)
+    # Names that take each other's place would go on for ever.
+    if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
+        return None
+    if found.named and not (stage.location.sharp(LEVEL) or _more_could(bench, base, current)):
+        return None
+    named = _one_more(bench, base, current, found, stage, bool(found.named), during)
+    if found.named and (named is None or named.of_left < MOST):
+        within = _one_more(bench, base, current, found, stage, False, during)
+        # No formula errs by so much that another explains most of it.
+        if within is not None and (named is None or within.of_left > max(MOST, named.of_left)):
+            named = within
+    if named is None:
+        return None
+    stage.named = named
+    found.named.append(named)
+    current = named.fit
+    if len(found.named) == 1:
+        # A base that carried nothing could tell nothing of its springs.
+        current = together(bench, current, rough=True) if current.undetermined else current
+        current = sharpened(bench, current)
+    align(bench, current)
+    reweigh(bench, current)
+    if len(found.named) > 1:
+        tell = during("again", "asking each name again beside the others")
+        if current.undetermined:
+            current = together(bench, current, rough=True)
+        current = _again(bench, base, current, found, tell)
+        current = sharpened(bench, current)
+        align(bench, current)
+        reweigh(bench, current)
+    return current
+
+
+def _one_more(
+    bench: Bench,
+    base: Fit,
+    current: Fit,
+    found: Search,
+    stage: Stage,
+    beyond: bool,
+    during: Callable[[str, str], Step],
+) -> Named | None:
+    """The best further effect; ``beyond``: of what no curve over the present ones' coordinates explains.
+
+    No formula is ever exact, and what the present ones leave in their own coordinates would be taken for
+    another effect. An effect that shows there only must explain much more.
+    """
+    left = beyond_curves(bench, current, found.left) if beyond else found.left
+    places = stage.location.places
+    if stage.screening is None:
+        tell = during("screen", "screening the catalogue")
+        first = found.stages[0].screening
+        screening = screen(
+            bench, current.state, left, stage.location.lines, places=places, before=first, on_step=tell
+        )
+    else:
+        screening = ranked_anew(stage.screening, left)
+    if stage.screening is None or screening.chance < stage.screening.chance:
+        stage.screening = screening
+    if not screening.ranked or screening.chance > LEVEL:
+        return None
+    if not found.named and screening.ranked[0].share.share < LEAST_SHARE:
+        return None
+    tell = during("fit", "fitting the shortlist")
+    coordinate = places[0].coordinate if places else ""
+    named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell)
+    if named is None:
+        return None
+    named.gain = _gain(bench, base, current, named.fit)
+    named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
+    sharp = named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL)
+    if found.named and sharp:
+        # Lines stand out of what is left, however little they are beside what was missing and what still is.
+        named.of_lines = _of_lines(bench, current, named.fit, stage.location.lines)
+        return named
+    least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
+    return named if named.gain >= least else None
+
+
+def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
+    """A residual without what smooth curves over the coordinates of the added effects explain.
+
+    An exact formula leaves nothing there: what is left in its coordinate is another's.
+    """
+    homes = {
+        (coordinate, channel)
+        for one, channels in zip(current.state.added, shown_in(bench, current), strict=True)
+        if not catalogue()[one.effect].signature.exact
+        for coordinate in one.lives_in
+        for channel in channels
+    }
+    curves = curves_over(bench, bench.residuals(current.predictions, drift=True), homes)
+    return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
+
+
+def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
+    """Channels in which each added effect shows more than the noise: in others it can leave nothing."""
+    numbers, noise = bench.stacked_series(), bench.noise_powers
+    found = []
+    for k, added in enumerate(current.state.added):
+        columns = current.columns[:, current.numbers_of(k)][:, : len(added.coefficients)]
+        powers = (columns @ np.array(added.coefficients)) ** 2
+        own = {
+            channel: sum(
+                float(powers[numbers == k].sum()) for k, s in enumerate(bench.series) if s.channel == channel
+            )
+            for channel in bench.channels
+        }
+        found.append([channel for channel in bench.channels if own[channel] > noise[channel]])
+    return found
+
+
+def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
+    """Largest part of what a channel lacked at first, beyond its noise, that a fit explains more."""
+    first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
+    noise = bench.noise_powers
+    return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
+
+
+def _of_lines(bench: Bench, before: Fit, now: Fit, lines: Sequence[Line]) -> float:
+    """Part of the lines of what was left that a fit explains."""
+    last, new = (
+        power_of(bench, bench.residuals(each.predictions, drift=True), lines) for each in (before, now)
+    )
+    return float(np.clip(1.0 - new / last, 0.0, 1.0)) if last > 0 else 0.0
+
+
+def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
+    """Whether more than noise is left in some channel, enough for one more effect to matter."""
+    first, last = (bench.channel_powers(each.predictions) for each in (base, now))
+    noise = bench.noise_powers
+    return any(last[c] - noise[c] >= BEYOND_GAIN * (first[c] - noise[c]) for c in first)
+
+
+def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, every: bool = False) -> Fit:
+    """Ask every name again; ``found.named`` is changed in place.
+
+    The last one was asked beside the others, and is so again only where they have changed since, or where it
+    has gone to the end of its range.
+    """
+    first = bench.power(current.predictions)
+    k = 0
+    while k < len(found.named):
+        stuck = current.state.added[k].at_limit
+        if not (stuck or every) and _clear(found.named[k], found.named[-1]):
+            k += 1
+            continue
+        settled = bench.power(current.predictions) > (1.0 - NEWS) * first
+        if k == len(found.named) - 1 and settled and not (stuck or every):
+            break
+        own, added = found.named[k], current.state.added
+        rest = without(bench, current, k)
+        if rest is None:
+            k += 1
+            continue
+        left = left_of(bench, rest)
+        lines: list[Line] = []
+        residuals = bench.residuals(rest.predictions, drift=True)
+        for channel in bench.channels:
+            lines += order_lines(bench, residuals, channel)
+        tell(f"{own.name} again")
+        screening = screen(bench, rest.state, left, lines, before=found.stages[0].screening)
+        named = None
+        if screening.ranked and screening.chance <= LEVEL:
+            named = name_effect(bench, rest, screening, left, on_step=tell)
+        alone = len(found.named) == 1
+        if named is None or (not alone and _gain(bench, base, rest, named.fit) < BEYOND_GAIN):
+            # The others explain what it did, so what it explained is theirs.
+            gone, newest = found.named.pop(k), found.named[-1] if found.named else None
+            if newest is not None and k < len(found.named):
+                if set(added[k].lives_in) & set(added[-1].lives_in):
+                    _inherit(newest, gone)  # a law elsewhere cannot have explained it
+                if newest.name in gone.group:
+                    # It was as good a name before, and neither is needed beside the other.
+                    newest.group[gone.name] = 1.0
+            current = rest
+            continue
+        loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
+        same = named.name == own.name or own.name in named.group
+        if same or stuck or now < (1.0 - SAME) * loss:
+            own = named if named.name == own.name or not same or stuck else own
+            if own is named:
+                # It was fitted last: back to its place.
+                last = len(added) - 1
+                current = named.fit.ordered([*range(k), last, *range(k, last)])
+            else:
+                own.group = {name: part for name, part in named.group.items() if name != own.name}
+                own.group[named.name] = 1.0
+            before = found.named[k]
+            own.gain, own.of_lines = before.gain, before.of_lines
+            found.named[k] = own
+        k += 1
+    return current
+
+
+def _inherit(one: Named, other: Named) -> None:
+    """A name that takes another's place explains at least what that did."""
+    one.gain = max(one.gain, other.gain)
+
+
+def _clear(one: Named, newest: Named) -> bool:
+    """Whether a name won so clearly that what came since can't have changed it."""
+    return one is not newest and one.confidence >= CLEAR and not one.group and newest.gain < NEWS * one.gain
+
+
+def left_of(bench: Bench, current: Fit) -> Residual:
+    """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
+    zeros = [column[:, None] for column in unwound(bench, current.state, current.predictions).values()]
+    # A delay of a few samples takes little, but without its bounds it would take all that lags.
+    own = [k for k in range(current.columns.shape[1]) if k >= len(current.frees) or not current.frees[k].step]
+    columns: Array = np.hstack([current.columns[:, own], bench.offset_columns(), *zeros])
+    return Residual(
+        bench.stacked(bench.residuals(current.predictions, drift=True)), columns, bench.stacked_blocks()
+    )

@@ -1,0 +1,326 @@
+"""Step 5a, the fast screen: the trace of every effect of the catalogue, and how much of the rest it explains.
+
+Every effect is simulated in the re-fitted model, at a size that suits the residual; the change of all
+channels together is its trace. The cross-validated share of the residual that it explains ranks it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hdsim.diagnosis.locate import Place
+from hdsim.diagnosis.screen import LEVEL, Residual, Share, chance_of
+from hdsim.diagnosis.starts import neighbours, starts
+from hdsim.effects import catalogue
+from hdsim.effects._fitting import Fitting
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.orders import Line
+from hdsim.estimate.predict import CARRIED, PredictionError
+from hdsim.estimate.records import Array
+from hdsim.estimate.state import Added, State, number_at
+
+#: Starts that are many, and the share of a channel below which nothing lives in a coordinate.
+MANY, TRACELESS = 6, 2e-3
+#: Times that the shapes of the effects that explain most are refined, and the part of the best share for it.
+REFINED, REFINABLE = 2, 0.1
+#: Part of its best fitting's share that another kind of fitting must reach to be fitted too.
+KINDRED = 0.8
+#: Factor within which a trace's size must fit the residual's; else its unit is changed.
+FITTING = 4.0
+
+
+@dataclass
+class Screened:
+    """An effect on the screen: the fitting of it that explains most, and its trace, shape (rows, k).
+
+    ``others`` are fittings of other kinds that explain nearly as much.
+    """
+
+    name: str
+    added: Added
+    share: Share
+    columns: Array
+    others: list[Screened] = field(default_factory=list)
+
+
+@dataclass
+class Screening:
+    """The whole catalogue on the screen.
+
+    Attributes:
+        ranked: by falling share, one entry an effect.
+        chance: probability that the search finds the best share where nothing is missing.
+        skipped: effects that could not be tried, with the reason.
+        seen: traces that were simulated, whitened with ``sigmas``, by effect, way of fitting and shapes.
+        sigmas: of every series when they were.
+    """
+
+    ranked: list[Screened] = field(default_factory=list)
+    chance: float = 1.0
+    skipped: dict[str, str] = field(default_factory=dict)
+    seen: dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array]] = field(default_factory=dict)
+    sigmas: Array = field(default_factory=lambda: np.zeros(0))
+
+
+def screen(
+    bench: Bench,
+    state: State,
+    residual: Residual,
+    lines: Sequence[Line],
+    *,
+    places: Sequence[Place] = (),
+    before: Screening | None = None,
+    on_step: Callable[[str], object] | None = None,
+) -> Screening:
+    """Rank every effect of the catalogue by the share of the residual that its trace explains.
+
+    Args:
+        bench: the measured series.
+        state: the re-fitted model.
+        residual: what it leaves.
+        lines: peaks of the order spectra.
+        places: where the residual lives; fittings with many starts are left out where theirs shows nothing.
+        before: an earlier screening of these data. What an effect does is nearly the same whatever other
+            effects the model has by now, so its traces serve again; those that come near are refined anew.
+        on_step: told what is being tried.
+    """
+    found = Screening(sigmas=np.array([series.sigma for series in bench.series]))
+    shares: list[Share] = []
+    present = set(state.effects) | {added.effect for added in state.added}
+    tried: list[Added] = []
+    many: list[Added] = []
+    ranges = bench.ranges(state)
+    measured = bench.measured
+    for name, kind in catalogue().items():
+        fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
+        if name in present and not kind.several:
+            found.skipped[name] = "the model has it"
+            continue
+        if not fittings:
+            continue  # it stands for what has no name
+        for fitting in fittings:
+            if any(channel not in bench.channels for channel in fitting.needs):
+                continue
+            if not measured.issuperset(fitting.follows) or measured.intersection(fitting.unless):
+                continue
+            if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):
+                found.skipped[name] = f"the model has {' and '.join(fitting.covered_by)}"
+                continue
+            if bench.turns < fitting.turns:
+                found.skipped[name] = f"the wave generator makes {bench.turns:.2g} turns only"
+                continue
+            if (name, fitting.label) in {(added.effect, added.fitting.label) for added in state.added}:
+                continue
+            if behind_sensor(bench, state, name, fitting, ranges):
+                found.skipped[name] = (
+                    "acts on the load's side of the torque sensor, whose reading is the load"
+                )
+                continue
+            begins = starts(name, fitting, lines, ranges)
+            (tried if len(begins) < MANY else many).extend(begins)
+    if on_step is not None:
+        on_step(f"{len(tried)} traces")
+    kinds: dict[tuple[str, str], Screened] = {}
+    wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
+    with bench.coarse():
+        without = bench.predict(state)
+
+    def look(several: Sequence[Added], *, first: bool = True) -> None:
+        known = _known(before, several, found.sigmas, bench) if first else []
+        keys = {_key(added) for added, _ in known}
+        with bench.coarse():
+            new = [added for added in several if _key(added) not in keys]
+            found_traces = known + traces(bench, state, without, new, wanted)
+        for added, columns in found_traces:
+            if columns is None or not np.any(columns):
+                continue
+            if first and not added.orders:
+                found.seen[_key(added)] = added, columns
+            share = _allowed(residual, columns, added.fitting.signed(added.orders))
+            shares.append(share)
+            key = added.effect, added.fitting.label
+            if key not in kinds or share.share > kinds[key].share.share:
+                added = replace(added, coefficients=tuple(share.coefficients))
+                kinds[key] = Screened(added.effect, added, share, columns)
+
+    look(tried)
+    # A residual may live in a coordinate that only an effect's trace shows, as it rings on its way.
+    alive = {_home(one.name) for one in kinds.values() if one.share.share > TRACELESS}
+    alive |= {place.coordinate for place in places if place.share > TRACELESS}
+    look([added for added in many if _home(added.effect) in alive or not places])
+    for name in {added.effect for added in many if _home(added.effect) not in alive and places}:
+        found.skipped[name] = f"nothing lives in the {_home(name).replace('_', ' ')}"
+    for times in range(REFINED):
+        most = max((one.share.share for one in kinds.values()), default=0.0)
+        worth = [one for one in kinds.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
+        look([added for one in worth for added in neighbours(one.added, times)], first=False)
+    best: dict[str, Screened] = {}
+    for one in sorted(kinds.values(), key=lambda one: -one.share.share):
+        first = best.setdefault(one.name, one)
+        if one is not first and one.share.share >= KINDRED * first.share.share:
+            first.others.append(one)
+    for name in catalogue():
+        if name not in best:
+            found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
+    found.ranked += best.values()
+    _remarkable_first(found, shares)
+    return found
+
+
+def _remarkable_first(found: Screening, shares: Sequence[Share]) -> None:
+    """Set the chance of the best; where that may be chance, leave out what ranks above one that is not.
+
+    Each is held against the best of the whole search on surrogates, so asking all of them raises no alarm
+    more often than asking the first (single-step, Westfall and Young 1993).
+    """
+    chances = [chance_of(one.share, shares) for one in found.ranked[:1]]
+    if chances and chances[0] > LEVEL:
+        chances += [chance_of(one.share, shares) for one in found.ranked[1:] if one.share.share > 0]
+        first = next((k for k, chance in enumerate(chances) if chance <= LEVEL), 0)
+        found.ranked, chances = found.ranked[first:], chances[first:]
+    found.chance = chances[0] if chances else 1.0
+
+
+def _key(added: Added) -> tuple[str, str, tuple[float, ...]]:
+    return added.effect, added.fitting.label, added.shapes
+
+
+def _known(
+    before: Screening | None, wanted: Sequence[Added], sigmas: Array, bench: Bench
+) -> list[tuple[Added, Array | None]]:
+    """Traces of an earlier screening in these weights; without those whose orders are read from the data."""
+    if before is None:
+        return []
+    factor = (before.sigmas / sigmas)[bench.stacked_series()][:, None]
+    found: list[tuple[Added, Array | None]] = []
+    for added in wanted:
+        if not added.orders and _key(added) in before.seen:
+            earlier, columns = before.seen[_key(added)]
+            found.append((earlier, columns * factor))
+    return found
+
+
+def ranked_anew(screening: Screening, residual: Residual) -> Screening:
+    """A screening's traces on another residual of the same model."""
+    found = Screening(skipped=screening.skipped)
+    shares: list[Share] = []
+    for one in screening.ranked:
+        kinds = []
+        for each in (one, *one.others):
+            share = _allowed(residual, each.columns, each.added.fitting.signed(each.added.orders))
+            shares.append(share)
+            added = replace(each.added, coefficients=tuple(share.coefficients))
+            kinds.append(Screened(each.name, added, share, each.columns))
+        kinds.sort(key=lambda kind: -kind.share.share)
+        kinds[0].others = kinds[1:]
+        found.ranked.append(kinds[0])
+    found.ranked.sort(key=lambda one: -one.share.share)
+    _remarkable_first(found, shares)
+    return found
+
+
+def _home(name: str) -> str:
+    """The coordinate in which an effect shows most."""
+    return catalogue()[name].signature.lives_in[0]
+
+
+def behind_sensor(
+    bench: Bench, state: State, name: str, fitting: Fitting, ranges: Mapping[str, float]
+) -> bool:
+    """Whether an effect acts on the output, in records whose load is what the output's torque sensor reads.
+
+    Such an effect changes the torque that the sensor has measured already, so it cannot be missing there.
+    """
+    first = bench.predictors[0]
+    if first.plan.load != "output_torque":
+        return False
+    for added in starts(name, fitting, (), ranges)[:1]:
+        try:
+            without = first.predict(state.candidate())
+            tried = replace(state, added=(*state.added, added))
+            there = first.predict(tried.candidate())
+        except PredictionError:
+            return True
+        torque = float(np.std(there[CARRIED] - without[CARRIED])) / abs(first.ratio)
+        motor = float(np.std(there.get("motor_torque", np.zeros(1)) - without.get("motor_torque", 0.0)))
+        return torque > 0.5 * motor and torque > 0.0
+    return False
+
+
+def traces(
+    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added], wanted: float
+) -> list[tuple[Added, Array | None]]:
+    """Change of the whitened predictions for each coefficient at 1 alone, shape (rows, k).
+
+    Args:
+        bench: the measured series.
+        state: the model without the effects.
+        predictions: its predictions.
+        tried: the effects; each is simulated apart.
+        wanted: root-mean-square that a trace should have; units that are far too small or large for this
+            drive are changed, and the trace is simulated again.
+
+    Returns:
+        Every effect in the units that were used, with its design, None where it could not be predicted.
+    """
+    found = list(zip(tried, designs(bench, state, predictions, tried), strict=True))
+    again: dict[int, Added] = {}
+    for k, (added, columns) in enumerate(found):
+        if columns is None or added.fitting.cumulative or added.fitting.play:
+            continue
+        size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
+        if size > 0 and not wanted / FITTING < size < wanted * FITTING:
+            factor = float(np.clip(wanted / size, 1e-3, 1e5))
+            again[k] = replace(added, fitting=added.fitting.rescaled(factor))
+    for (k, added), columns in zip(
+        again.items(), designs(bench, state, predictions, list(again.values())), strict=True
+    ):
+        if columns is not None:
+            found[k] = (added, columns)
+    return found
+
+
+def designs(
+    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added]
+) -> list[Array | None]:
+    """The design of every effect in its own units, see ``traces``."""
+    states = []
+    for added in tried:
+        count = len(added.coefficients)
+        below = 1.0 if added.fitting.cumulative else 0.0
+        for k in range(count):
+            unit = tuple(1.0 if j == k else below if j < k else 0.0 for j in range(count))
+            states.append(replace(state, added=(*state.added, replace(added, coefficients=unit))))
+    there = iter(bench.predict_all(states))
+    found: list[Array | None] = []
+    for added in tried:
+        own = [next(there) for _ in added.coefficients]
+        columns: list[Array] = []
+        before: Sequence[Array] = predictions
+        for one in own:
+            if one is None:
+                break
+            columns.append(bench.trace(before, one))
+            if added.fitting.cumulative:
+                before = one
+        found.append(np.column_stack(columns) if len(columns) == len(own) else None)
+    return found
+
+
+def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:
+    """The share with coefficients of the allowed sign: a wrong one is left out."""
+    use = [True] * columns.shape[1]
+    while True:
+        kept = np.array(use)
+        share = residual.share(columns * kept)
+        wrong = [k for k, c in enumerate(share.coefficients) if use[k] and c < 0 and not free[k]]
+        if not wrong:
+            return share
+        for k in wrong:
+            use[k] = False
+        if not any(use):
+            powers = residual.powers
+            return Share(0.0, powers, np.zeros(columns.shape[1]), share.chance)

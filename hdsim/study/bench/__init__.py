@@ -1,6 +1,0 @@
-"""Bench procedures: scenario, metrics and picture; importing this package registers them."""
-
-from hdsim.study.bench import transmission  # isort: skip - the order is that of the command's table
-from hdsim.study.bench import frequency, friction, positioning, settling, torsion
-
-__all__ = ["frequency", "friction", "positioning", "settling", "torsion", "transmission"]
