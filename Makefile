@@ -15,7 +15,7 @@ help:
 	@echo "make test-fast  the same without the slow studies"
 	@echo "make setup      only install what is needed into $(VENV)"
 	@echo "make lock       resolve the development set anew (needs uv)"
-	@echo "make schema     write the JSON schemas of scenarios and load cycles anew"
+	@echo "make schema     write the JSON schemas of what people write anew"
 	@echo "make blind      hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
 	@echo "make picture    draw docs/images/seed_move.png and diagnose_report.webp anew (the latter needs Chromium)"
 	@echo "make clean      remove $(VENV), caches and logs"
@@ -50,6 +50,8 @@ lock:
 
 schema: $(STAMP)
 	$(BIN)/hdsim schema -o scenarios/scenario.schema.json
+	$(BIN)/hdsim schema mapping -o scenarios/mappings/mapping.schema.json
+	$(BIN)/hdsim schema study -o scenarios/studies/study.schema.json
 	$(BIN)/hdsim schema loadcycle -o scenarios/loadcycles/loadcycle.schema.json
 
 blind: $(STAMP)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hdsim.notebook.tasks import diagnose, fit, plant, plants, study
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
+    from hdsim.simulation.ensemble import simulate_all
     from hdsim.simulation.linear import io_system, linearize
     from hdsim.simulation.simulate import simulate
 
@@ -43,6 +44,7 @@ __all__ = [
     "plant",
     "plants",
     "simulate",
+    "simulate_all",
     "study",
 ]
 
@@ -59,6 +61,7 @@ _HOMES = {
     "plant": "hdsim.notebook.tasks",
     "plants": "hdsim.notebook.tasks",
     "simulate": "hdsim.simulation.simulate",
+    "simulate_all": "hdsim.simulation.ensemble",
     "study": "hdsim.notebook.tasks",
 }
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from typing import Any
 
 import click
 
-from hdsim.errors import HdsimError
+from hdsim.errors import HdsimError, PluginWarning
 
 #: Where each command lives, and its line in ``hdsim --help``.
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("hdsim.simulation.commands:run", "Simulate a scenario, write its log, draw its figure."),
     "examples": ("hdsim.scenario.commands:examples", "List the scenarios that come with hdsim."),
-    "new": ("hdsim.scenario.commands:new", "Copy an example to start a scenario from."),
-    "check": ("hdsim.scenario.commands:check", "Check scenarios and say what they describe."),
-    "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios, for editors."),
+    "new": ("hdsim.scenario.commands:new", "Copy an example, or begin an effect of your own."),
+    "check": ("hdsim.scenario.commands:check", "Check scenarios, mappings and studies; say what they are."),
+    "schema": ("hdsim.scenario.commands:schema", "Print the JSON schema of scenarios or other files."),
     "effects": ("hdsim.scenario.commands:effects", "List the physical effects that a scenario can turn on."),
     "presets": ("hdsim.studies.commands:presets", "List the drives that are ready to use."),
     "catalogue": (
@@ -43,9 +44,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
     "import": ("hdsim.log.import_commands:import_data", "Turn a measured recording into a log."),
+    "mapping": ("hdsim.log.mapping_commands:mapping", "Draft a mapping of a measured recording."),
     "replay": ("hdsim.live.commands:replay", "Serve a finished log and its layouts to a viewer."),
     "info": ("hdsim.log.commands:info", "Show what is in a log."),
-    "export": ("hdsim.log.commands:export", "Write a table of a log as CSV or Parquet."),
+    "export": ("hdsim.export.commands:export", "Write a log or a scenario for other programs."),
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
     "layout": ("hdsim.log.commands:layout", "Print a layout that shows a log in Foxglove."),
     "fit": ("hdsim.tell.fit_commands:fit", "Fit a scenario's numbers to measured records."),
@@ -124,6 +126,17 @@ def hdsim(context: click.Context, debug: bool) -> None:
         click.echo(context.get_help())
 
 
+def _show_warning(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+    """Say in a line what another package does wrong; everything else as Python does."""
+    if issubclass(category, PluginWarning):
+        click.echo(f"warning: {message}", err=True)
+    else:
+        _pythons_way(message, category, *where, **more)
+
+
+_pythons_way = warnings.showwarning
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 a check failed, 2 bad input, 130 interrupted.
 
@@ -136,6 +149,7 @@ def main(arguments: list[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     # Taken from the raw arguments, because the error may come before click has read them.
     debug = "--debug" in given
+    warnings.showwarning = _show_warning
     try:
         result: Any = hdsim.main(args=given, prog_name="hdsim", standalone_mode=False)
     except click.ClickException as error:

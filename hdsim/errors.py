@@ -13,3 +13,7 @@ class InputError(HdsimError):
 
 class PhysicsError(HdsimError):
     """The parameters describe a drive that cannot exist, or leave a law's range of validity."""
+
+
+class PluginWarning(UserWarning):
+    """Another package adds something to hdsim that cannot be used; the command line prints it in one line."""

@@ -7,13 +7,13 @@ from typing import Any
 
 
 def at(data: Any, path: str) -> Any:
-    """The value at a dotted path of nested mappings.
+    """The value at a dotted path of nested mappings; numbers in the path are indices of lists.
 
     Raises:
-        KeyError: there is none.
+        LookupError: there is none.
     """
     for key in path.split("."):
-        data = data[key]
+        data = data[int(key)] if isinstance(data, list) else data[key]
     return data
 
 

@@ -73,13 +73,15 @@ class Recording:
 
     ``recording["motor_angle"]``, or ``recording.motor_angle``, reads the state table. ``static`` holds what
     does not change in time (tooth angles, gaps). ``metadata`` maps names to text (scenario, versions, seed,
-    solver, tolerances).
+    solver, tolerances). ``sensitivities`` holds, by parameter, the derivatives that were asked for; a log
+    does not keep them.
     """
 
     tables: dict[str, Table]
     static: dict[str, Column] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)
     metadata: dict[str, str] = field(default_factory=dict)
+    sensitivities: dict[str, Table] = field(default_factory=dict)
 
     @property
     def state(self) -> Table:

@@ -11,7 +11,8 @@ from pydantic import Field, model_validator
 from hdsim.actuation._kernels import controller as controller_kernel
 from hdsim.actuation._kernels import held_torque, motor_torque
 from hdsim.actuation.canonical import CanonicalController, Loop, Side, canonical_controller
-from hdsim.actuation.controllers import Controller, PositionController, VelocityController
+from hdsim.actuation.choice import PositionController, VelocityController
+from hdsim.actuation.controllers import Controller
 from hdsim.actuation.shapes import Hold
 from hdsim.actuation.signal_data import SignalData
 from hdsim.actuation.signals import AngleTrajectory, SignalModel, TorqueSignal, VelocityTrajectory

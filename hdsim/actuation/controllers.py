@@ -7,7 +7,7 @@ taken care of, so that positive gains always mean negative feedback.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -32,7 +32,13 @@ InputName = Literal[
 
 
 class Controller(Parameters):
-    """Base of the controllers: no anti-windup."""
+    """Base of the controllers: no anti-windup.
+
+    Class attributes:
+        commands: what one of another package can follow; hdsim's own are listed in ``choice.py``.
+    """
+
+    commands: ClassVar[tuple[str, ...]] = ("position", "velocity")
 
     def system(self, loop: Loop) -> Any:
         """Its ``control.StateSpace`` from w to the motor torque."""
@@ -321,12 +327,3 @@ class StateSpace(Controller):
         import numpy as np
 
         return np.array(self.anti_windup_gain or [0.0] * len(C), dtype=float)
-
-
-PositionController = Annotated[
-    PositionPI | PositionPD | PositionPID | Cascade | TransferFunction | StateSpace,
-    Field(discriminator="type"),
-]
-VelocityController = Annotated[
-    VelocityPI | VelocityPID | TransferFunction | StateSpace, Field(discriminator="type")
-]

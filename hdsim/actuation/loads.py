@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import PydanticKnownError
 
 from hdsim.actuation._kernels import gravity_arm, load_torque
+from hdsim.actuation.arm import Arm
 from hdsim.actuation.signals import TorqueSignal
 from hdsim.number import Number
 from hdsim.parts import Builder, Part
@@ -41,15 +43,36 @@ class GravityArm(Part):
 class Load(Part):
     """What hangs on the output."""
 
-    inertia_kg_m2: Annotated[float, Number(0.5, far=15.0)] = Field(gt=0.0)
-    """Moment of inertia about the output's axis. Unit kg m^2."""
+    arm: Arm | None = None
+    """A robot arm of which the drive moves one joint."""
+    inertia_kg_m2: Annotated[float, Number(0.5, far=15.0)] = Field(0.0, ge=0.0, validate_default=True)
+    """Moment of inertia about the output's axis, beside that of ``arm``; above 0 where there is none. Unit
+    kg m^2."""
     torque: TorqueSignal | None = None
     """External torque on the output over time, positive in the direction of positive output angle."""
     gravity: GravityArm | None = None
     """A mass on an arm."""
 
+    @field_validator("inertia_kg_m2")
+    @classmethod
+    def _some_inertia(cls, value: float, known: ValidationInfo) -> float:
+        if known.data.get("arm", ...) is None and not value > 0.0:
+            raise PydanticKnownError("greater_than", {"gt": 0.0})
+        return value
+
+    def over(self, seconds: float) -> tuple[list[Any], float]:
+        """The parts of the load, and the moment of inertia that the model has with them, kg m^2.
+
+        Args:
+            seconds: time that an arm's motion has to cover, s.
+        """
+        if self.arm is None:
+            return [self], self.inertia_kg_m2
+        part = self.arm.course(seconds).part(self.arm)
+        return [self, part], self.inertia_kg_m2 + part.inertia_kg_m2
+
     def contribute(self, build: Builder) -> None:
-        """Add the external torque and gravity; the inertia is the assembly's to read."""
+        """Add the external torque and gravity; inertia and arm are the assembly's to ask for (``over``)."""
         if self.torque is not None:
             build.element(load_torque, [build.signal(self.torque.data)])
         if self.gravity is not None:

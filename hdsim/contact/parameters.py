@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args
 
 from pydantic import Field, FilePath
 
 from hdsim.parts import Parameters
+from hdsim.plugins import plugins, wrong_choice
 
 if TYPE_CHECKING:
     from hdsim.contact.law import ContactLaw
@@ -129,8 +130,20 @@ class TableLawParameters(Parameters):
         return TableLaw.from_csv(self.file)
 
 
-ContactParameters = Annotated[
-    MajumdarBhushanParameters | ConstantStiffnessParameters | HertzLineParameters | TableLawParameters,
-    Field(discriminator="law"),
-]
+_LAWS = (MajumdarBhushanParameters, ConstantStiffnessParameters, HertzLineParameters, TableLawParameters)
+
+
+def _laws() -> Any:
+    """The union of hdsim's laws and those of other packages (entry point ``hdsim.contact_laws``)."""
+    known = [get_args(law.model_fields["law"].annotation)[0] for law in _LAWS]
+    found = plugins("contact_laws", known, lambda one: wrong_choice(one, Parameters, "law", "build"))
+    return Union[(*_LAWS, *(one.value for one in found.values()))]
+
+
+if TYPE_CHECKING:
+    ContactParameters = (
+        MajumdarBhushanParameters | ConstantStiffnessParameters | HertzLineParameters | TableLawParameters
+    )
+else:
+    ContactParameters = Annotated[_laws(), Field(discriminator="law")]
 """The contact law of a tooth pair, chosen by ``law``."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -20,12 +19,13 @@ from hdsim.diagnosis.experiments import Experiment, experiments, limits_of
 from hdsim.diagnosis.further import Candidate, NextExperiment
 from hdsim.diagnosis.separation import noise_of, separated
 from hdsim.errors import InputError
-from hdsim.estimate.bench import THREADS, Bench
+from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import LEAD_IN_S
-from hdsim.estimate.records import CHANNELS, Array
+from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
 from hdsim.estimate.vector import Vector
+from hdsim.log.mapping import MEASURED
 from hdsim.plot import units
 
 #: Rate at which experiments are simulated, Hz; the noise counts at the rate of the data.
@@ -101,7 +101,7 @@ def propose(
         )
         for o in ranked
     ]
-    unit = units.Unit(CHANNELS[chosen.channel], 1.0)
+    unit = units.Unit(MEASURED[chosen.channel], 1.0)
     if unit.name == "rad":
         unit = units.for_error(chosen.difference)
     sentence = (
@@ -167,6 +167,8 @@ def _repetition(bench: Bench) -> Experiment:
 
 def _outcomes(bench: Bench, tried: Sequence[Experiment], fits: Mapping[str, Fit]) -> list[Outcome]:
     """Simulate experiments under all candidates and all small changes of their numbers."""
+    from hdsim.simulation.ensemble import in_order
+
     noise = noise_of(bench, next(iter(fits.values())))
     rate = min(RATE_HZ, _rate(bench))
     plans = {name: _steps(fit) for name, fit in fits.items()}
@@ -178,8 +180,7 @@ def _outcomes(bench: Bench, tried: Sequence[Experiment], fits: Mapping[str, Fit]
             if shifted is not None:
                 jobs.append((shifted[0], fit.state))
     channels = list(noise)
-    with ThreadPoolExecutor(THREADS) as pool:
-        done = iter(list(pool.map(lambda job: _simulated(job[0], job[1], channels, rate), jobs)))
+    done = iter(in_order(lambda job: _simulated(job[0], job[1], channels, rate), jobs))
     found = []
     for experiment in tried:
         shifted = experiment.shifted()
@@ -242,7 +243,8 @@ def _simulated(
     from hdsim.actuation.command import Command
     from hdsim.actuation.loads import Load
     from hdsim.drive.model import Model
-    from hdsim.estimate.predict import MeasuredTorque, PredictionError
+    from hdsim.estimate.known_load import MeasuredTorque
+    from hdsim.estimate.predict import PredictionError
     from hdsim.simulation.run import Run
 
     try:

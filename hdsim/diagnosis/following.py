@@ -23,7 +23,7 @@ def candidates(diagnosis: Diagnosis) -> dict[str, Fit]:
     A group of effects that cannot be told apart comes before a weak name. All fits are those made when the
     effect was named, so that they know the same other effects.
     """
-    if diagnosis.verdict.verdict != "effect":
+    if diagnosis.verdict.verdict != "effect" or diagnosis.start.load.arm is not None:
         return {}
     bench = diagnosis.bench
     for one in diagnosis.named:

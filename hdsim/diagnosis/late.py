@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdsim.diagnosis.orders import LEAST_LINE, over_angle
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.numbers import delay_freedoms
+from hdsim.estimate.orders import LEAST_LINE, over_angle
 from hdsim.estimate.records import Array
 
 #: Ages of a channel's readings that are tried, in samples (three spreads of what is believed of a delay), and

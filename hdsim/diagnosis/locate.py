@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hdsim.diagnosis.coordinates import coordinates, hats, oscillators
-from hdsim.diagnosis.orders import Line, order_lines
 from hdsim.diagnosis.screen import Residual
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.orders import Line, order_lines
 from hdsim.estimate.records import Array
 
 #: Corners of the piecewise linear curves over a coordinate; of a finer one over the output's angle, where a

@@ -16,13 +16,13 @@ import numpy as np
 from hdsim.diagnosis.late import read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, SAME, Named, name_effect
-from hdsim.diagnosis.orders import Line, order_lines, power_of
 from hdsim.diagnosis.revise import revised, without
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
+from hdsim.estimate.orders import Line, order_lines, power_of
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import align, reweigh, together, with_delays
 from hdsim.estimate.unwound import unwound

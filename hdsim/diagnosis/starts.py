@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
-from hdsim.diagnosis.orders import Line
 from hdsim.effects._fitting import WIDER, Fitting
+from hdsim.estimate.orders import Line
 from hdsim.estimate.state import Added
 
 #: Orders of a periodic term that are taken from the spectra.

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hdsim.diagnosis.locate import Place
-from hdsim.diagnosis.orders import Line
 from hdsim.diagnosis.screen import LEVEL, Residual, Share, chance_of
 from hdsim.diagnosis.starts import neighbours, starts
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.orders import Line
 from hdsim.estimate.predict import CARRIED, PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State, number_at

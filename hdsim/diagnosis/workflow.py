@@ -20,6 +20,7 @@ from hdsim.diagnosis.search import Search, Stage, search
 from hdsim.diagnosis.verdict import Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
+from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Check
 from hdsim.estimate.fit import Fit, added_spreads, base_intervals
@@ -84,6 +85,7 @@ def diagnose(
     load: LoadSource | None = None,
     zeros: Zeros = "campaign",
     force: bool = False,
+    black_box: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Diagnosis:
     """Find what a model is missing.
@@ -95,16 +97,21 @@ def diagnose(
         load: where the load's torque comes from; ``output_torque`` takes what the joint's sensor measures.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
         force: go on in spite of errors in the data.
+        black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
         on_step: told what is being done.
 
     Returns:
         The diagnosis with its verdict.
 
     Raises:
-        InputError: the data cannot answer the question, or are suspect (see ``force``).
+        InputError: the data cannot answer the question, or are suspect (see ``force``), or a black box is
+            asked for without scikit-learn.
     """
+    if black_box:
+        trees()
     with one_blas_thread():
-        return _diagnosed(measured, scenario, holdout, load, zeros, force, on_step or (lambda _: None))
+        tell = on_step or (lambda _: None)
+        return _diagnosed(measured, scenario, holdout, load, zeros, force, black_box, tell)
 
 
 def _diagnosed(
@@ -114,6 +121,7 @@ def _diagnosed(
     load: LoadSource | None,
     zeros: Zeros,
     force: bool,
+    black_box: bool,
     tell: Callable[[str], object],
 ) -> Diagnosis:
     """See ``diagnose``."""
@@ -173,6 +181,8 @@ def _diagnosed(
     if current is not found.fit:
         with step("prove", "proving on held-out data"):
             gap, predictions = gaps(bench, states | {"after": current.state})
+    with step("prove", "proving on held-out data"):
+        gap = with_baselines(bench, start, gap, black_box=black_box)
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
     problems += [*doubts, *one_way(bench), *moving_zeros(bench, current.predictions)]

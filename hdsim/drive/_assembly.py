@@ -36,6 +36,7 @@ from hdsim.drive._layout import (
     STATES,
 )
 from hdsim.drive._rigid import evaluate_rigid
+from hdsim.drive._terms import read_coordinates
 from hdsim.kernel import (
     system,
 )
@@ -83,5 +84,15 @@ def observe(address, times, states, integers, reals, inside, place, held, scratc
         if place >= 0:
             reals[place] = held[k]
         call_system(address, times[k], states[k], integers, reals, scratch, 0, dy, nothing, nothing)
+        for c in range(len(places)):
+            rows[k, c] = scratch[places[c]]
+
+
+@_jit
+def observe_coordinates(times, states, integers, reals, inside, scratch, places, rows):  # type: ignore[no-untyped-def]
+    """What ``observe`` keeps of angles and velocities that are states or prescribed, without any torque."""
+    for k in range(times.shape[0]):
+        reals[INSIDE] = inside[k]
+        read_coordinates(times[k], states[k], integers, reals, scratch)
         for c in range(len(places)):
             rows[k, c] = scratch[places[c]]

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from hdsim._compile import compiled
 from hdsim.drive._mesh_layout import (
     BORDER,
@@ -252,3 +254,14 @@ def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
             if depth > 0.0:
                 force = by_x * hermite(p, int(p[CONTACT_AT]), p[CONTACT_STEP], p[CONTACT_CELLS], depth)[1]
                 forces[tooth] += weight * force * side
+
+
+@_jit
+def potentials(p, x, angles):  # type: ignore[no-untyped-def]
+    """``teeth_potential`` at several ring angles (m,), shape (m, 7)."""
+    found = np.empty((len(angles), 7))
+    for k in range(len(angles)):
+        found[k, 0], found[k, 1], found[k, 2], found[k, 3], found[k, 4], found[k, 5], found[k, 6] = (
+            teeth_potential(p, x, angles[k])
+        )
+    return found

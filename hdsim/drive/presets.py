@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from hdsim.drive.catalogue import (
@@ -23,6 +24,7 @@ from hdsim.drive.catalogue import (
 )
 from hdsim.drive.printed import Figure
 from hdsim.errors import PhysicsError
+from hdsim.plugins import Plugin, plugins
 
 _SEED_NAME = "seed-2021"
 _PRINTED_NAME = "seed-2021-printed-roughness"
@@ -58,7 +60,12 @@ def _size_and_ratio(name: str) -> tuple[int, int]:
     """
     known: dict[str, tuple[int, int]] = {_SEED_NAME: (20, 100), _PRINTED_NAME: (20, 100)}
     known |= {f"csg-{size}-{ratio}": (size, ratio) for size, ratio in SIZES_AND_RATIOS}
+    if name in outside():
+        raise ValueError(
+            f"preset {name!r} is of {outside()[name].distribution}, without a catalogue's figures"
+        )
     if name not in known:
+        known |= dict.fromkeys(outside(), (0, 0))
         begun = [other for other in known if name and other.startswith(name)]
         near = begun or difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
@@ -66,8 +73,22 @@ def _size_and_ratio(name: str) -> tuple[int, int]:
     return known[name]
 
 
+@cache
+def outside() -> dict[str, Plugin]:
+    """Presets of other packages by name (entry point ``hdsim.presets``).
+
+    A value is what ``preset`` returns, or a function without arguments that returns it.
+    """
+
+    def wrong(one: Plugin) -> str:
+        fits = callable(one.value) or isinstance(one.value, Mapping)
+        return "" if fits else f"found {one.value!r}, expected a mapping or a function that returns one"
+
+    return plugins("presets", preset_names(), wrong)
+
+
 def preset_names() -> tuple[str, ...]:
-    """Names of all presets."""
+    """Names of hdsim's own presets."""
     return (_SEED_NAME, _PRINTED_NAME, *(f"csg-{size}-{ratio}" for size, ratio in SIZES_AND_RATIOS))
 
 
@@ -106,6 +127,12 @@ def preset(name: str) -> dict[str, Any]:
     Raises:
         ValueError: unknown name; the message lists the known ones.
     """
+    if name in outside():
+        one = outside()[name]
+        try:
+            return deepcopy(dict(one.value() if callable(one.value) else one.value))
+        except Exception as error:  # whatever another package does wrong
+            raise ValueError(f"preset {name!r} of {one.distribution} fails: {error}") from error
     figures = catalogue_figures(name)
     radius = figures.pitch_radius.value
     face_width = _FACE_WIDTH_PER_RADIUS * radius

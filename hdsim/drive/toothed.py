@@ -235,9 +235,7 @@ class Teeth:
         """Mean over the wave generator's angle of mesh torque (N m) and engaged share at a twist (rad)."""
         parameters = np.concatenate(self._blocks)
         angles = np.arange(PROBES) * np.pi / PROBES * (1 + 1 / self.count)
-        samples = np.array(
-            [_teeth.teeth_potential(parameters, self.lever_m * twist, angle) for angle in angles]
-        )
+        samples = _teeth.potentials(parameters, self.lever_m * twist, angles)
         return float(samples[:, 1].mean() * self.lever_m), float(samples[:, 6].mean() / self.count)
 
     def loaded(self, torque_nm: float) -> tuple[float, float]:
@@ -293,10 +291,8 @@ class Teeth:
         x = np.linspace(-reach, reach, mesh.twist_nodes)
         step = x[1] - x[0]
         angles = np.arange(mesh.angle_nodes) * np.pi / mesh.angle_nodes
-        values = np.array([[_teeth.teeth_potential(exact, xi, angle)[0] for angle in angles] for xi in x])
-        ends = np.array(
-            [[_teeth.teeth_potential(exact, xi, angle)[1] for angle in angles] for xi in (x[0], x[-1])]
-        )
+        values = np.array([_teeth.potentials(exact, xi, angles)[:, 0] for xi in x])
+        ends = np.array([_teeth.potentials(exact, xi, angles)[:, 1] for xi in (x[0], x[-1])])
         # Uniform B-spline coefficients: periodic in the angle, the exact force at both ends of x.
         turns = 2 * np.pi * np.arange(mesh.angle_nodes // 2 + 1) / mesh.angle_nodes
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-from hdsim.effects import catalogue
+from hdsim.effects import own
 from hdsim.effects._plausible import Plausible, Scale
 from hdsim.parts import Effect, Parameters
 
@@ -54,7 +54,7 @@ A new effect is a new file with one subclass of `hdsim.parts.Effect`. This page 
 
 def page() -> str:
     """The page as Markdown."""
-    return "\n".join([HEAD, *(section(name, kind) for name, kind in catalogue().items())])
+    return "\n".join([HEAD, *(section(name, kind) for name, kind in own().items())])
 
 
 def section(name: str, kind: type[Effect]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -18,9 +17,6 @@ from hdsim.estimate.series import Series
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
-
-#: Models that are simulated at the same time, in threads: the compiled solver lets go of the interpreter.
-THREADS = min(4, os.cpu_count() or 1)
 
 #: Aimed length of a block, s, and the least and most blocks of a record.
 BLOCK_S = 0.25
@@ -232,7 +228,7 @@ class Bench:
         Returns:
             One list of series for each, None where the model could not be predicted.
         """
-        from concurrent.futures import ThreadPoolExecutor
+        from hdsim.simulation.ensemble import in_order
 
         def one(state: State) -> list[Array] | None:
             try:
@@ -240,10 +236,7 @@ class Bench:
             except PredictionError:
                 return None
 
-        if len(states) < 2 or THREADS < 2:
-            return [one(state) for state in states]
-        with ThreadPoolExecutor(THREADS) as pool:
-            return list(pool.map(one, states))
+        return in_order(one, states)
 
     def offsets(self, predictions: Sequence[Array], *, drift: bool = False) -> list[float]:
         """The sensors' zeros, SI units: what is measured less what is predicted, by ``offsets_of``."""

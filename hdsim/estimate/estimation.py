@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdsim.errors import InputError
+from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.data_problems import Problem
@@ -117,6 +118,7 @@ def estimate(
     load: LoadSource | None = None,
     zeros: Zeros = "campaign",
     force: bool = False,
+    black_box: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
     """Fit a scenario's numbers to measured records; ``hdsim.fit`` takes files too.
@@ -135,12 +137,16 @@ def estimate(
         load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
         force: go on in spite of errors in the data.
+        black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
         on_step: told what is being done.
 
     Raises:
-        InputError: the data cannot answer the question, or are suspect (see ``force``), or a path is none.
+        InputError: the data cannot answer the question, or are suspect (see ``force``), or a path is none, or
+            a black box is asked for without scikit-learn.
     """
     tell = on_step or (lambda _: None)
+    if black_box:
+        trees()
     tell("checking the data")
     records, held, checks = checked(measured, scenario, holdout=holdout, force=force)
     tell("predicting the measured channels")
@@ -158,6 +164,7 @@ def estimate(
     tell("proving on held-out data")
     states = {"before": start, "refit": found.fit.state, "after": found.fit.state}
     gap, predictions = gaps(bench, states)
+    gap = with_baselines(bench, start, gap, black_box=black_box)
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
     problems += [*one_way(bench), *moving_zeros(bench, found.fit.predictions)]

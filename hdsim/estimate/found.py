@@ -36,7 +36,12 @@ class Gap(Part):
     after: float
     """With the named effects."""
     noise: float
-    """Standard deviation of the channel's noise."""
+    """Standard deviation of the channel's noise, as neighbouring readings differ by it: a mark, and no bound.
+    Errors that last over many readings are larger; what can be foretold of them a model may come below."""
+    regression: float | None = None
+    """Of a plain regression of the same training samples (``hdsim/estimate/baseline.py``)."""
+    black_box: float | None = None
+    """Of gradient boosting after that regression, where it was asked for."""
     unit: str
     """Unit of all of them."""
     data: Literal["holdout"] = "holdout"
@@ -44,7 +49,7 @@ class Gap(Part):
     variation: float
     """Standard deviation of the measured channel (of the transmission error, for the output's angle)."""
     intervals: dict[str, tuple[float, float]] = {}
-    """95 % intervals of before, refit and after, from resampled blocks of time."""
+    """95 % intervals by the names of the above, from resampled blocks of time."""
 
 
 class DataProblem(Part):

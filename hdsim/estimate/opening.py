@@ -80,5 +80,7 @@ def bench_for(
         for many in (records, held)
     )
     ratio, locked = scenario.drive.ratio, locked_side(scenario)
-    training = predictors(records, ratio, load=load, locked=locked)
-    return Bench(training, predictors(held, ratio, load=load, locked=locked), zeros)
+    training, proving = (
+        predictors(many, ratio, load=load, locked=locked, arm=scenario.load.arm) for many in (records, held)
+    )
+    return Bench(training, proving, zeros)

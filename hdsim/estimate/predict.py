@@ -19,6 +19,7 @@ import numpy as np
 
 from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.knots import least_squares_spline
+from hdsim.estimate.known_load import Gravity, MeasuredTorque, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, signal, smoothed
@@ -26,9 +27,10 @@ from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
 if TYPE_CHECKING:
+    from hdsim.actuation.arm import Arm
     from hdsim.actuation.signal_data import SignalData
     from hdsim.drive.parameters import Drive
-    from hdsim.parts import Builder, Effect
+    from hdsim.parts import Effect
 
 #: Time for which the model runs before the record begins, so that its own oscillation has died away, s.
 LEAD_IN_S = 0.5
@@ -67,30 +69,6 @@ class Candidate:
     effects: dict[str, Effect]
     load: Any
     seed: int = 0
-
-
-class MeasuredTorque:
-    """A measured torque on the output."""
-
-    def __init__(self, torque: SignalData) -> None:
-        self.torque = torque
-
-    def contribute(self, build: Builder) -> None:
-        """Add the torque to the output."""
-        from hdsim.actuation._kernels import load_torque
-
-        build.element(load_torque, [build.signal(self.torque)])
-
-
-class _Gravity:
-    """A load without its torque over time."""
-
-    def __init__(self, load: Any) -> None:
-        self.load = load
-
-    def contribute(self, build: Builder) -> None:
-        if self.load.gravity is not None:
-            self.load.gravity.contribute(build)
 
 
 def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked = "") -> Plan:
@@ -149,10 +127,13 @@ class Predictor:
         record: the measured run.
         plan: what is prescribed and predicted.
         ratio: the model's signed ratio.
+        arm: what the drive's joint carries, where that is a robot arm; its numbers are each candidate's own.
         rtol: relative tolerance of the integration.
     """
 
-    def __init__(self, record: Record, plan: Plan, ratio: float, rtol: float = RTOL) -> None:
+    def __init__(
+        self, record: Record, plan: Plan, ratio: float, arm: Arm | None = None, rtol: float = RTOL
+    ) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
         turns, self._zero = 0, 0.0
         if plan.motion == "motor_angle" and "output_angle" in record.readable and not plan.locked:
@@ -185,7 +166,10 @@ class Predictor:
         if plan.load == "output_torque":
             factor = ratio if plan.motion == "output_angle" else 1.0
             self._slow = SlowPart(record.time, factor * values / (2 * np.pi))
-            self._slow_torque = self._slow.of(record.filled("output_torque"))
+            #: What the sensor that is the load is compared with, shape (n,).
+            self.slow_torque = self._slow.of(record.filled("output_torque"))
+        #: Of an arm; a torque sensor that is the load has it in its reading.
+        self.course = arm_course(record, arm) if arm is not None and plan.load != "output_torque" else None
         self.ratio = ratio
         self.runs = 0
 
@@ -285,13 +269,18 @@ class Predictor:
         from hdsim.simulation.sample import sample
 
         load = candidate.load
-        parts: list[Any] = [*candidate.effects.values(), _Gravity(load)]
+        parts: list[Any] = [*candidate.effects.values(), Gravity(load)]
         if self.load_torque is not None:
             parts.append(MeasuredTorque(self.load_torque))
         elif load.torque is not None:
             # The scenario's load begins with the record, after the lead-in.
             late = LEAD_IN_S - self.record.begins_s
             parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(late))))
+        inertia = load.inertia_kg_m2
+        if self.course is not None:
+            arm = self.course.part(load.arm, LEAD_IN_S)
+            parts.append(arm)
+            inertia += arm.inertia_kg_m2
         if self._zero:
             parts.append(Zero(self._zero))
         motions: dict[str, Any] = {"motor": self.motion}
@@ -307,7 +296,7 @@ class Predictor:
             model = Model(
                 candidate.drive.resolved(),
                 parts,
-                load_inertia_kg_m2=load.inertia_kg_m2,
+                load_inertia_kg_m2=inertia,
                 motions=motions,
                 signals=self.signals,
                 seed=candidate.seed,
@@ -333,7 +322,7 @@ class Predictor:
                 # What the sensor adds, and of that what a slow load could not be.
                 own = found["output_torque"] - found[CARRIED]
                 own = own - self._slow.of(own) if np.any(own) else own
-                found["output_torque"] = self._slow_torque + own
+                found["output_torque"] = self.slow_torque + own
         return found
 
 
@@ -342,7 +331,12 @@ class PredictionError(ArithmeticError):
 
 
 def predictors(
-    records: Sequence[Record], ratio: float, *, load: LoadSource | None = None, locked: Locked = ""
+    records: Sequence[Record],
+    ratio: float,
+    *,
+    load: LoadSource | None = None,
+    locked: Locked = "",
+    arm: Arm | None = None,
 ) -> list[Predictor]:
     """One predictor for each record."""
-    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio) for r in records]
+    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio, arm) for r in records]

@@ -8,8 +8,9 @@ import numpy as np
 
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Gap
-from hdsim.estimate.records import CHANNELS, Array
+from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
+from hdsim.log.mapping import MEASURED
 
 #: Draws of blocks for the intervals.
 DRAWS = 500
@@ -39,7 +40,7 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
             refit=numbers["refit"],
             after=numbers["after"],
             noise=float(np.sqrt(np.mean([bench.series[k].noise ** 2 for k in own]))),
-            unit=CHANNELS[channel],
+            unit=MEASURED[channel],
             variation=variation(bench, own[0]),
             intervals=intervals,
         )

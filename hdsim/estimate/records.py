@@ -9,24 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.log.mapping import MEASURED
 
 if TYPE_CHECKING:
-    from hdsim.recording import Recording
+    from hdsim.recording import Recording, Table
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: The contract's channels and their units.
-CHANNELS = {
-    "motor_angle": "rad",
-    "motor_velocity": "rad/s",
-    "motor_torque": "N m",
-    "output_angle": "rad",
-    "output_velocity": "rad/s",
-    "output_torque": "N m",
-    "load_torque": "N m",
-    "temperature": "degC",
-}
 #: Fewest samples, and shortest record, that a diagnosis can work with.
 FEWEST_SAMPLES, SHORTEST_S = 200, 0.5
 _WHY_SO_LONG = (
@@ -51,6 +41,7 @@ class Record:
         source: the record as it was read, where this one has means of its readings.
         readings: that a sample is the mean of.
         begins_s: time of the first sample in the source, s.
+        joints: angles of other joints of the same machine by name, shape (n,) each, rad.
     """
 
     name: str
@@ -61,6 +52,7 @@ class Record:
     source: Record | None = None
     readings: int = 1
     begins_s: float = 0.0
+    joints: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for channel, values in self.channels.items():
@@ -128,13 +120,24 @@ def record_from(recording: Recording, name: str = "") -> Record:
             "give the parts as records"
         )
     channels = {}
-    for channel in CHANNELS:
+    for channel in MEASURED:
         source = f"measured_{channel}" if f"measured_{channel}" in recording else channel
         if source in recording:
             channels[channel] = np.asarray(recording[source], dtype=float)
     if not channels:
-        raise InputError(f"{name}: no channel of {', '.join(CHANNELS)}; found {', '.join(recording)}")
-    return Record(name, time - time[0], channels, ratio=_ratio(recording))
+        raise InputError(f"{name}: no channel of {', '.join(MEASURED)}; found {', '.join(recording)}")
+    joints = recording.tables.get("joints")
+    others = {} if joints is None else {j: _whole(name, j, time, joints) for j in joints.columns}
+    return Record(name, time - time[0], channels, ratio=_ratio(recording), joints=others)
+
+
+def _whole(name: str, joint: str, time: Array, table: Table) -> Array:
+    """A joint's angle at the record's times, what is missing interpolated."""
+    values = np.asarray(table[joint], dtype=float)
+    good = np.isfinite(values)
+    if good.sum() < 2:
+        raise InputError(f"{name}: joint {joint} has no angle that is a number")
+    return np.asarray(np.interp(time, table.time[good], values[good]))
 
 
 def _ratio(recording: Recording) -> float | None:

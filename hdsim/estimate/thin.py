@@ -56,7 +56,7 @@ def thinned(record: Record, count: int) -> Record:
     time = means(record.time)
     return Record(
         record.name, time - time[0], channels, trusted, record.ratio, source=record, readings=count,
-        begins_s=float(time[0]),
+        begins_s=float(time[0]), joints={name: means(values) for name, values in record.joints.items()},
     )  # fmt: skip
 
 

@@ -73,17 +73,6 @@ def info(log: Path, columns: bool) -> None:
 
 @click.command()
 @_LOG
-@click.argument("out", type=click.Path(path_type=Path))
-@click.option("--table", default="state", show_default=True, help="Table to write.")
-def export(log: Path, out: Path, table: str) -> None:
-    """Write a table of LOG to OUT, a .csv or .parquet file, or its joint states as a ROS 2 bag, an .mcap."""
-    from hdsim.log.export import export_log
-
-    click.echo(export_log(log, out, table))
-
-
-@click.command()
-@_LOG
 def verify(log: Path) -> None:
     """Check every CRC, index, schema and message of LOG; exit code 1 if anything is wrong."""
     from hdsim.log.check import verify_log

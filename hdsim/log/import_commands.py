@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from hdsim.console import reading
+
 
 @click.command(name="import")
 @click.argument("data", type=click.Path(path_type=Path))
@@ -16,7 +18,7 @@ import click
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="The log [default: logs/DATA.mcap].")
 def import_data(data: Path, mapping: Path | None, output: Path | None) -> None:
-    """Turn the measured recording DATA (CSV, Parquet, MCAP, ROS 2 bag) into a log."""
+    """Turn the recording DATA (CSV, Excel, Parquet, MATLAB, HDF5, TDMS, MDF, MCAP, ROS) into a log."""
     from hdsim.errors import InputError
     from hdsim.log.importing import import_recording, write_imported
 
@@ -25,7 +27,8 @@ def import_data(data: Path, mapping: Path | None, output: Path | None) -> None:
         raise InputError(f"--output: found {path}, expected a file name that ends in .mcap")
     if path.exists() and data.exists() and path.samefile(data):
         raise InputError(f"--output: {path} is the file to be read")
-    recording = import_recording(data, mapping)
+    with reading(data) as tell:
+        recording = import_recording(data, mapping, tell)
     write_imported(recording, path)
     time = recording.time
     click.echo(f"imported {len(time)} samples over {time[-1] - time[0]:.6g} s: {', '.join(recording)}")

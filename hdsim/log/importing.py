@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from hdsim.errors import InputError
 from hdsim.log import foreign, naming
+from hdsim.log.clock import seconds, spread
 from hdsim.log.mapping import (
-    TIME_UNITS,
+    MEASURED,
     AngleChannel,
     Channels,
     IntervalMask,
@@ -23,30 +24,34 @@ from hdsim.log.mapping import (
     OutlierMask,
     TorqueChannel,
     _Channel,
-    mapping_of,
     side_of,
 )
+from hdsim.log.mapping_source import mapping_of
+from hdsim.log.readers.contract import Numbers, Tell, silent
+from hdsim.log.readers.topics import Samples
 from hdsim.recording import Column, Event, Recording, Table
 
 Array = NDArray[np.float64]
 #: Finds the numbers that a mapping names, by topic.
-Reader = Callable[[Path, Mapping, Sequence[Origin]], dict[str, foreign.Samples]]
+Reader = Callable[[Path, Mapping, Sequence[Origin], Tell], dict[str, Samples]]
 
-UNITS = {"angle": "rad", "velocity": "rad/s", "torque": "N m", "temperature": "degC"}
 _TOLD_GAPS = 50
-#: Range of what a constant rate leaves of stamps in whole ticks, in ticks: one, and the rate's own error.
-WHOLE_TICK = 1.05
+#: What the name of another joint begins with, beside the channels.
+_JOINT = "joint "
 
 
 def import_recording(
-    path: str | Path, mapping: str | Path | dict[str, Any] | Mapping | None = None
+    path: str | Path,
+    mapping: str | Path | dict[str, Any] | Mapping | None = None,
+    tell: Tell = silent,
 ) -> Recording:
     """Read a measured recording into the names and units of our own.
 
     Args:
-        path: a CSV, Parquet or MCAP file, or a ROS 2 bag (its folder).
+        path: a file of one of the formats of `hdsim.log.readers`, or a ROS 2 bag (its folder).
         mapping: a mapping's file, the same as a dictionary, or a mapping; None for a log of hdsim, which
             needs none.
+        tell: hears which share of the file has been read.
 
     Returns:
         A recording whose ``state`` holds what was measured: ``motor_angle``, ``motor_velocity``,
@@ -67,15 +72,18 @@ def import_recording(
         from hdsim.log.reader import open_log
 
         return open_log(path)
-    return Import(path, mapping_of(mapping)).recording()
+    return Import(path, mapping_of(mapping), tell).recording()
 
 
 class Import:
     """One recording on its way; ``read`` finds numbers as `foreign.read` does."""
 
-    def __init__(self, path: Path, mapping: Mapping, read: Reader = foreign.read) -> None:
+    def __init__(
+        self, path: Path, mapping: Mapping, tell: Tell = silent, read: Reader = foreign.read
+    ) -> None:
         self.path = path
         self.mapping = mapping
+        self.tell = tell
         self._read = read
         self.events: list[Event] = []
         self._first_ns: int | None = None
@@ -84,18 +92,27 @@ class Import:
         """The whole recording."""
         mapping = self.mapping
         given = mapping.channels.given()
+        joints: dict[str, _Channel] = {_JOINT + name: channel for name, channel in mapping.joints.items()}
+        given |= joints
         time, raw = self._samples(given)
         start = time[0]
         time = time - start
+        for name, channel in given.items():
+            if raw[name].dtype.kind == "M":
+                raise InputError(f"{self.path}: {name}: column {channel.column!r} holds dates, no numbers")
         columns = {name: self._convert(name, channel, raw[name]) for name, channel in given.items()}
         masked = self._mask(time, columns)
         if mapping.ratio is not None and {"motor_angle", "output_angle"} <= set(columns):
             columns["transmission_error"] = columns["output_angle"] - columns["motor_angle"] / mapping.ratio
         gaps = self._gaps(time)
         self._tell(given, masked)
-        table = Table(time, {name: _column(name, values) for name, values in columns.items()})
+        turned = {name: columns.pop(name) for name in joints}
+        tables = {"state": Table(time, {name: _column(name, values) for name, values in columns.items()})}
+        if turned:
+            named = {name.removeprefix(_JOINT): Column(v, "rad", "measured") for name, v in turned.items()}
+            tables["joints"] = Table(time, named)
         return Recording(
-            {"state": table},
+            tables,
             events=sorted(self.events, key=lambda event: event.time),
             metadata=self._metadata(float(start), gaps),
         )
@@ -109,7 +126,7 @@ class Import:
         if clock.column is not None or clock.field is not None:
             time_origin = Origin(column=clock.column, topic=clock.topic, field=clock.field)
             wanted.append(time_origin)
-        found = self._read(self.path, mapping, list(dict.fromkeys(wanted)))
+        found = self._read(self.path, mapping, list(dict.fromkeys(wanted)), self.tell)
         lead = clock.topic or next(iter(origins.values())).topic or ""
         if lead not in found:
             raise InputError(f"{self.path}: the time's topic {lead!r} gives no channel: name a field of it")
@@ -133,7 +150,7 @@ class Import:
             raise InputError(f"{self.path}: no row meets the mapping's select")
         return time[keep], {name: rows[origin][keep] for name, origin in origins.items()}
 
-    def _time(self, topic: str, samples: foreign.Samples, recorded: Array | None, *, leads: bool) -> Array:
+    def _time(self, topic: str, samples: Samples, recorded: Numbers | None, *, leads: bool) -> Array:
         """Times of the samples of a topic, in s, strictly increasing."""
         clock = self.mapping.time
         place = f"{self.path}: {topic}" if topic else str(self.path)
@@ -145,9 +162,7 @@ class Import:
         if clock.rate_hz is not None:
             return np.arange(count) / clock.rate_hz
         if recorded is not None:
-            time = recorded * TIME_UNITS[clock.unit or "s"]
-            if clock.wraps_at is not None:
-                time = np.unwrap(time, period=clock.wraps_at * TIME_UNITS[clock.unit or "s"])
+            time = seconds(recorded, clock.unit or "s", clock.wraps_at, place)
         elif topic:
             time = self._stamped(samples, place, leads)
         else:
@@ -156,7 +171,7 @@ class Import:
         if len(bad):
             raise InputError(f"{place}: sample {bad[0] + 1} has no time")
         if clock.quantised:
-            return _spread(time, place)
+            return spread(time, place)
         back = np.flatnonzero(np.diff(time) <= 0)
         if len(back):
             k = int(back[0])
@@ -167,7 +182,7 @@ class Import:
             )
         return time
 
-    def _stamped(self, samples: foreign.Samples, place: str, leads: bool) -> Array:
+    def _stamped(self, samples: Samples, place: str, leads: bool) -> Array:
         """Stamps of messages in s, counted from the first of all topics, which keeps them exact to 1 ns."""
         kind = self.mapping.time.stamp
         stamps = samples.stamps.get(kind)
@@ -281,42 +296,6 @@ def outliers(values: Array, mask: OutlierMask) -> NDArray[np.bool_]:
     return found
 
 
-def _spread(time: Array, place: str) -> Array:
-    """Times for samples that share one, stretch by stretch between missed ticks of the clock.
-
-    Where one constant rate meets every stamp to a tick, it is that of the samples; else they are spread
-    evenly over the sample number between changes of the clock.
-    """
-    steps = np.diff(time)
-    if (steps < 0).any():
-        k = int(np.flatnonzero(steps < 0)[0])
-        raise InputError(f"{place}: time goes back: sample {k + 2} at {time[k + 1]:.9g} s")
-    if not (steps > 0).any():
-        raise InputError(f"{place}: the clock never advances")
-    tick = float(np.median(steps[steps > 0]))
-    missed = steps > 1.5 * tick
-    stretches = np.split(time, np.flatnonzero(missed) + 1)
-    period = (time[-1] - time[0] - steps[missed].sum()) / max(len(time) - len(stretches), 1)
-    return np.concatenate([_evened(stretch, tick, period) for stretch in stretches])
-
-
-def _evened(time: Array, tick: float, period: float) -> Array:
-    """The times of one stretch; ``period`` is the mean one, for a stretch without a change of the clock."""
-    index = np.arange(len(time), dtype=np.float64)
-    first = np.flatnonzero(np.concatenate([[True], np.diff(time) > 0]))
-    if len(first) < 2:
-        return np.asarray(time[0] + period * index)
-    rate, start = np.polyfit(index, time, 1)
-    rest = time - (start + rate * index)
-    if np.ptp(rest) <= WHOLE_TICK * tick:
-        # A clock that counts whole ticks is late by half of one on the average.
-        return np.asarray(start + rate * index + 0.5 * (rest.min() + rest.max() + tick))
-    # After the last change the mean rate goes on.
-    rate = (time[first[-1]] - time[0]) / first[-1]
-    end = time[first[-1]] + rate * (len(time) - first[-1])
-    return np.asarray(np.interp(index, np.append(first, len(time)), np.append(time[first], end)))
-
-
 def _at(time: Array, other: Array, values: Array) -> Array:
     """Numbers of another topic at the times of the leading one; NaN outside of its time."""
     found: Array = np.interp(time, other, values, left=np.nan, right=np.nan)
@@ -330,7 +309,7 @@ def _origin(channel: _Channel) -> Origin:
 def _column(name: str, values: Array) -> Column:
     if name == "transmission_error":
         return Column(values, "rad", "measured output angle less motor angle over ratio")
-    return Column(values, UNITS[name.rsplit("_", 1)[-1]], "measured")
+    return Column(values, MEASURED[name], "measured")
 
 
 def write_imported(recording: Recording, path: str | Path) -> Path:

@@ -3,37 +3,23 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field, model_validator
 
+from hdsim.log.units import ANGLE_UNITS, CURRENT_UNITS, TORQUE_UNITS, TURN, VELOCITY_UNITS
 from hdsim.parts import Parameters
 
 Side = Literal["motor", "output"]
-
-_TURN = 2 * math.pi
-#: Factor to SI and offset of each unit that a mapping may name, by kind of quantity.
-ANGLE_UNITS = {
-    "rad": 1.0,
-    "mrad": 1e-3,
-    "deg": _TURN / 360,
-    "arcmin": _TURN / 21600,
-    "arcsec": _TURN / 1296000,
-    "rev": _TURN,
-}
-VELOCITY_UNITS = {"rad/s": 1.0, "deg/s": _TURN / 360, "rpm": _TURN / 60, "rev/s": _TURN}
-TORQUE_UNITS = {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2}
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 class Origin(Parameters):
     """Where numbers are found: a column of a table, or a field of a topic's messages."""
 
-    column: str | None = None
-    """Name of the column in a CSV or Parquet file."""
+    column: str | int | None = None
+    """Column of a table: its name, or its number from 1 (without quotation marks)."""
     topic: str | None = None
-    """Topic in an MCAP file or a ROS 2 bag."""
+    """Topic in an MCAP file or a ROS bag."""
     field: str | None = None
     """Field of the topic's message, such as ``effort``, ``state.position[2]``."""
     joint: str | None = None
@@ -42,7 +28,7 @@ class Origin(Parameters):
     @model_validator(mode="after")
     def _one_place(self) -> Origin:
         if (self.column is None) == (self.topic is None):
-            raise ValueError("name either a column (CSV, Parquet) or a topic (MCAP, ROS 2)")
+            raise ValueError("name either a column (of a table) or a topic (MCAP, ROS)")
         if self.topic is not None and self.field is None and self._needs_field:
             raise ValueError("a topic needs a field, the field of its messages that is meant")
         return self
@@ -53,6 +39,7 @@ class Origin(Parameters):
 class _Channel(Origin):
     """A channel's origin, and how its numbers become SI."""
 
+    si_unit: ClassVar[str]
     sign: Literal[1, -1] = 1
     """-1 where the recording counts in the other direction than the contract."""
     zero: float = 0.0
@@ -76,6 +63,7 @@ class _Sided(_Channel):
 class AngleChannel(_Sided):
     """An angle."""
 
+    si_unit: ClassVar[str] = "rad"
     unit: Literal["rad", "mrad", "deg", "arcmin", "arcsec", "rev", "count"]
     """Unit of the recorded numbers."""
     counts_per_turn: float | None = Field(None, gt=0)
@@ -92,12 +80,13 @@ class AngleChannel(_Sided):
     @property
     def factor(self) -> float:
         """Rad in one recorded unit."""
-        return _TURN / self.counts_per_turn if self.counts_per_turn else ANGLE_UNITS[self.unit]
+        return TURN / self.counts_per_turn if self.counts_per_turn else ANGLE_UNITS[self.unit]
 
 
 class VelocityChannel(_Sided):
     """An angular velocity."""
 
+    si_unit: ClassVar[str] = "rad/s"
     unit: Literal["rad/s", "deg/s", "rpm", "rev/s"]
     """Unit of the recorded numbers."""
 
@@ -110,26 +99,30 @@ class VelocityChannel(_Sided):
 class TorqueChannel(_Sided):
     """A torque, or the motor current that makes it."""
 
-    unit: Literal["N m", "mN m", "N cm", "A"]
+    si_unit: ClassVar[str] = "N m"
+    unit: Literal["N m", "mN m", "N cm", "kN m", "lbf in", "lbf ft", "A", "mA"]
     """Unit of the recorded numbers."""
     torque_constant_nm_per_a: float | None = Field(None, gt=0)
     """Torque of one ampere, on the side to which the numbers refer. Unit N m/A."""
 
     @model_validator(mode="after")
     def _current(self) -> TorqueChannel:
-        if (self.unit == "A") != (self.torque_constant_nm_per_a is not None):
-            raise ValueError("the unit A needs torque_constant_nm_per_a, and no other unit has it")
+        if (self.unit in CURRENT_UNITS) != (self.torque_constant_nm_per_a is not None):
+            raise ValueError("the units A and mA need torque_constant_nm_per_a, and no other unit has it")
         return self
 
     @property
     def factor(self) -> float:
         """N m in one recorded unit."""
-        return self.torque_constant_nm_per_a or TORQUE_UNITS[self.unit]
+        if self.torque_constant_nm_per_a is not None:
+            return self.torque_constant_nm_per_a * CURRENT_UNITS[self.unit]
+        return TORQUE_UNITS[self.unit]
 
 
 class TemperatureChannel(_Channel):
     """A temperature."""
 
+    si_unit: ClassVar[str] = "degC"
     unit: Literal["degC", "K", "degF"]
     """Unit of the recorded numbers."""
 
@@ -167,11 +160,20 @@ class Channels(Parameters):
         return {name: channel for name, channel in found.items() if channel is not None}
 
 
+def _si_unit(annotation: Any) -> str:
+    """Unit of the channel class in ``Class | None``."""
+    return next(str(one.si_unit) for one in get_args(annotation) if hasattr(one, "si_unit"))
+
+
+#: Every measured channel and its unit in a log: ``Channels`` is the one place where they are declared.
+MEASURED = {name: _si_unit(field.annotation) for name, field in Channels.model_fields.items()}
+
+
 class TimeSource(Parameters):
     """Where the time of a sample comes from."""
 
-    column: str | None = None
-    """Column that holds it."""
+    column: str | int | None = None
+    """Column that holds it, by its name or number."""
     topic: str | None = None
     """Topic whose messages give the samples; the others are interpolated to them. The first channel's topic
     when left out."""
@@ -181,8 +183,8 @@ class TimeSource(Parameters):
     """Time of a message: when it was logged, when it was published, or its header's stamp."""
     rate_hz: float | None = Field(None, gt=0)
     """Sample rate, where the recording has no time. Unit Hz."""
-    unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the column or field."""
+    unit: Literal["s", "ms", "us", "ns", "iso"] | None = None
+    """Unit of the column or field; ``iso`` for dates or times of day, as ISO 8601 writes them."""
     wraps_at: float | None = Field(None, gt=0)
     """Recorded number at which a counter starts at 0 again."""
     quantised: bool = False
@@ -203,8 +205,8 @@ class TimeSource(Parameters):
 class Select(Parameters):
     """Rows to keep, by the numbers of a column or field."""
 
-    column: str | None = None
-    """Column that decides."""
+    column: str | int | None = None
+    """Column that decides, by its name or number."""
     topic: str | None = None
     """Topic that decides."""
     field: str | None = None
@@ -270,23 +272,36 @@ class OutlierMask(Parameters):
 Mask = Annotated[IntervalMask | OutlierMask, Field(discriminator="type")]
 
 
-class Mapping(Parameters):
+class Form(Parameters):
+    """How a file is to be read."""
+
+    format: (
+        Literal["csv", "parquet", "excel", "matlab", "hdf5", "tdms", "mdf", "mcap", "ros1", "ros2"] | None
+    ) = None
+    """Format of the file; by its ending when left out (a folder is a ROS 2 bag)."""
+    separator: str | None = Field(None, min_length=1, max_length=1)
+    """Character between the columns of a CSV file; found when left out."""
+    decimal: Literal[".", ","] | None = None
+    """Decimal mark of a CSV file; found when left out."""
+    encoding: str | None = None
+    """Encoding of a CSV file, such as ``utf-8`` or ``cp1252``; found when left out."""
+    skip_lines: int = Field(0, ge=0)
+    """Lines at the beginning of a CSV file that are not looked at."""
+
+
+class Mapping(Form):
     """How a foreign recording becomes one of ours."""
 
     description: str = Field("", max_length=10_000)
     """What was measured, on which hardware, and where the file comes from."""
-    format: Literal["csv", "parquet", "mcap", "ros2"] | None = None
-    """Format of the file; by its ending when left out (a folder is a ROS 2 bag)."""
-    separator: str = Field(",", min_length=1, max_length=1)
-    """Character between the columns of a CSV file."""
-    skip_lines: int = Field(0, ge=0)
-    """Lines before the line with the column names of a CSV file."""
     ratio: float | None = None
     """Signed ratio, motor angle over output angle; negative where they turn against each other."""
     time: TimeSource
     """Time of the samples."""
     channels: Channels
     """What was measured."""
+    joints: dict[str, AngleChannel] = {}
+    """Angles of other joints of the same arm, by their names in its URDF; the side has no meaning."""
     select: tuple[Select, ...] = ()
     """Conditions that a row must meet, all of them."""
     longest_gap_s: float | None = Field(None, gt=0)
@@ -311,27 +326,21 @@ class Mapping(Parameters):
                 raise ValueError(f"a mask names {unknown[0]!r}; mapped are: {', '.join(given)}")
         return self
 
+    def summary(self) -> str:
+        """What it says, one line for time, ratio and each channel."""
+        clock = self.time
+        source = f"{clock.rate_hz:g} Hz" if clock.rate_hz else f"{clock.column or clock.topic or 'stamps'}"
+        lines = [f"time {source}{f' in {clock.unit}' if clock.unit else ''}"]
+        lines += [f"ratio {self.ratio:g}"] if self.ratio is not None else []
+        for name, channel in self.channels.given().items():
+            place = channel.column if channel.topic is None else f"{channel.topic} {channel.field}"
+            side = getattr(channel, "side", None)
+            lines.append(
+                f"{name} from {place} in {getattr(channel, 'unit', '')}{f', at the {side}' if side else ''}"
+            )
+        return "\n".join(f"  {line}" for line in lines)
+
 
 def side_of(channel: str) -> Side:
     """Side of the gear on which a channel of the contract is."""
     return "motor" if channel.startswith("motor") else "output"
-
-
-def mapping_of(given: str | Path | dict[str, Any] | Mapping) -> Mapping:
-    """A mapping from its file, from the same as a dictionary, or as it is.
-
-    Raises:
-        hdsim.scenario.ScenarioError: with one line for every mistake.
-    """
-    if isinstance(given, Mapping):
-        return given
-    from hdsim.scenario import load_model
-
-    if not isinstance(given, dict):
-        return load_model(given, Mapping)
-    from hdsim.nested import copied
-    from hdsim.scenario.problems import Mark
-    from hdsim.scenario.reader import Source
-    from hdsim.scenario.validation import build
-
-    return build(Source(copied(given), {(): Mark("mapping")}), Mapping)

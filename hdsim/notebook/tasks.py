@@ -41,6 +41,7 @@ def diagnose(
     load: LoadSource | None = None,
     zeros: Zeros = "campaign",
     force: bool = False,
+    black_box: bool = False,
     out: str | Path | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Diagnosis:
@@ -58,6 +59,7 @@ def diagnose(
         load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
         force: go on in spite of errors in the data.
+        black_box: learn the same samples by gradient boosting too (``hdsim[baseline]``).
         out: folder for the report, the log and the scenario with what was found (``verdict.scenario``);
             needs the scenario's file.
         on_step: told what is being done.
@@ -73,8 +75,9 @@ def diagnose(
     base = _file_for(scenario, out)
     records, held = _records(measured, mapping), _records(holdout, mapping)
     found = run(
-        records, _loaded(scenario), holdout=held, load=load, zeros=zeros, force=force, on_step=on_step
-    )
+        records, _loaded(scenario), holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
+        on_step=on_step,
+    )  # fmt: skip
     if base is not None and out is not None:
         from hdsim.tell.save import save
 
@@ -94,6 +97,7 @@ def fit(
     load: LoadSource | None = None,
     zeros: Zeros = "campaign",
     force: bool = False,
+    black_box: bool = False,
     out: str | Path | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
@@ -114,6 +118,7 @@ def fit(
         load: as for `diagnose`.
         zeros: likewise.
         force: likewise.
+        black_box: likewise.
         out: folder for ``fit.json``, the page and ``fitted.yaml``; needs the scenario's file.
         on_step: told what is being done.
 
@@ -129,7 +134,7 @@ def fit(
     records, held = _records(measured, mapping), _records(holdout, mapping)
     found = estimate(
         records, _loaded(scenario), holdout=held, free=free, fix=fix, apart=apart, load=load, zeros=zeros,
-        force=force, on_step=on_step,
+        force=force, black_box=black_box, on_step=on_step,
     )  # fmt: skip
     if base is not None and out is not None:
         from hdsim.tell.fit_report import save_fit

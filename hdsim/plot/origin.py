@@ -48,7 +48,7 @@ def subtitle(recording: Recording) -> str:
         if isinstance(mesh, dict) and "model" in mesh:
             parts.append(f"{mesh['model']} mesh")
     load = scenario.get("load")
-    if isinstance(load, dict) and "inertia_kg_m2" in load:
+    if isinstance(load, dict) and load.get("inertia_kg_m2"):
         parts.append(f"load {load['inertia_kg_m2']:g} kg m²")
     effects = scenario.get("effects")
     if isinstance(effects, dict) and effects:

@@ -85,7 +85,7 @@ def copy(name: str, out: Path | None = None) -> list[Path]:
     schema = out.parent / SCHEMA
     if not schema.exists():
         texts[schema] = json.dumps(json_schema(Scenario), indent=1) + "\n"
-    return [_write(path, text) for path, text in texts.items()]
+    return [write(path, text) for path, text in texts.items()]
 
 
 def _bases(path: Path) -> list[Path]:
@@ -97,7 +97,12 @@ def _bases(path: Path) -> list[Path]:
     return [base, *_bases(base)]
 
 
-def _write(path: Path, text: str) -> Path:
+def write(path: Path, text: str) -> Path:
+    """Write a file whole or not at all; its folder is made.
+
+    Raises:
+        InputError: it cannot be written.
+    """
     partial = path.with_name(path.name + ".partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

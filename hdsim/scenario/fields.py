@@ -6,6 +6,7 @@ import re
 import types
 from collections.abc import Mapping, Sequence
 from enum import Enum
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
@@ -68,9 +69,9 @@ class Shape(NamedTuple):
         """What may stand under ``item``: a field's name, a mapping's key or a list's index."""
         for choice in self.choices:
             if is_model(choice):
-                for name, field in choice.model_fields.items():
-                    if item in (name, field.alias):
-                        return shape_of_field(name, field)
+                shape = _shapes_of_fields(choice).get(item)
+                if shape is not None:
+                    return shape
             origin, arguments = get_origin(choice), get_args(choice)
             if isinstance(item, int) and _is_list(choice) and arguments:
                 fixed = origin is tuple and arguments[-1] is not Ellipsis
@@ -83,6 +84,17 @@ class Shape(NamedTuple):
 def is_model(annotation: Any) -> bool:
     """Whether an annotation is a pydantic model."""
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+@cache
+def _shapes_of_fields(model: type[BaseModel]) -> dict[str | int, Shape]:
+    """Shapes of a model's fields, by name and by alias."""
+    found: dict[str | int, Shape] = {}
+    for name, field in model.model_fields.items():
+        for key in (name, field.alias):
+            if key is not None:
+                found.setdefault(key, shape_of_field(name, field))
+    return found
 
 
 def shape_of_field(name: str, field: FieldInfo) -> Shape:

@@ -228,11 +228,13 @@ class Scenario(Parameters):
             torsion.stiffness_k3_nm_per_rad,
         )
         about = self.description.strip().split("\n")[0]
-        load_parts = [f"{load.inertia_kg_m2:g} kg m^2"]
+        load_parts = [f"{load.inertia_kg_m2:g} kg m^2"] if load.inertia_kg_m2 > 0 else []
         if load.torque is not None:
             load_parts.append("torque over time")
         if load.gravity is not None:
             load_parts.append("gravity arm")
+        if load.arm is not None:
+            load_parts.append(f"{load.arm.joint} of {load.arm.file.name}")
         samples = round(run.duration_s * run.sample_rate_hz)
         return {
             "scenario": f"{self.name}: {about}" if about else self.name,

@@ -30,16 +30,49 @@ _A11, _A12, _A21, _A22 = 5.0 / 12.0, -1.0 / 12.0, 0.75, 0.25
 
 
 @_jit
+def _pushes(address, t, y, own, lists, others, shared, scratch, kept, other, spare, dfdt, push):  # type: ignore[no-untyped-def]
+    """Differences of the others' right-hand sides from the model's ``own``, computed just before."""
+    first = shared[0, 0]
+    for i in range(len(kept)):
+        kept[i] = scratch[first + i]
+    for b in range(others.shape[0]):
+        to = shared[b, 1]
+        if to >= 0:
+            others[b, to : to + len(kept)] = kept
+        call_system(address, t, y, lists[b], others[b], scratch, 0, other, spare, dfdt)
+        for i in range(len(y)):
+            push[b, i] = other[i] - own[i]
+
+
+@_jit
 def follow(  # type: ignore[no-untyped-def]
-    address, integers, reals, others, scratch, times, states, pieces, count, fresh, near, slopes, t_eval, out
+    address,
+    integers,
+    reals,
+    others,
+    lists,
+    shared,
+    scratch,
+    times,
+    states,
+    pieces,
+    count,
+    fresh,
+    near,
+    slopes,
+    t_eval,
+    out,
 ):
     """Carry the models beside one along ``count`` of its steps.
 
     Args:
         address: of the system kernel; ``integers``, ``reals`` and ``scratch`` are its own.
-        integers: see ``hdsim.system.System``; those of every model.
+        integers: see ``hdsim.system.System``.
         reals: of the model.
-        others: of those beside it, shape (k, reals).
+        others: of those beside it, shape (k, reals); changed where they share.
+        lists: integers of those beside it, shape (k, integers).
+        shared: first place in the scratch, and in each other's reals (-1: in none), and number of what a
+            model beside this one takes from it instead of computing it, shape (k, 3).
         scratch: likewise.
         times: ends of the steps, shape (count + 1,) or longer.
         states: of the model there, shape (count + 1, n).
@@ -58,12 +91,14 @@ def follow(  # type: ignore[no-untyped-def]
     push_mid, push_end = np.empty((k, n)), np.empty((k, n))
     matrix, inverse = np.empty((2 * n, 2 * n)), np.empty(2 * n)
     pivots, both = np.empty(2 * n, dtype=np.int64), np.empty(2 * n)
+    kept = np.empty(max(0, np.max(shared[:, 2])))
     if fresh:
         call_system(address, times[0], states[0], integers, reals, scratch, 1, f, at_end, dfdt)
+        _pushes(
+            address, times[0], states[0], f, lists, others, shared, scratch, kept, other, at_mid, dfdt, slopes
+        )
         for b in range(k):
-            call_system(address, times[0], states[0], integers, others[b], scratch, 0, other, at_mid, dfdt)
             for i in range(n):
-                slopes[b, i] = other[i] - f[i]
                 for j in range(n):
                     slopes[b, i] += at_end[i, j] * near[b, j]
     sample = 0
@@ -77,14 +112,12 @@ def follow(  # type: ignore[no-untyped-def]
                 states[step + 1, i] + rest * (pieces[step, 0, i] + _NODE * pieces[step, 1, i])
             )
         call_system(address, t_mid, between, integers, reals, scratch, 1, mid, at_mid, dfdt)
-        call_system(address, t1, states[step + 1], integers, reals, scratch, 1, end, at_end, dfdt)
-        for b in range(k):
-            call_system(address, t_mid, between, integers, others[b], scratch, 0, other, matrix, dfdt)
-            for i in range(n):
-                push_mid[b, i] = other[i] - mid[i]
-            call_system(address, t1, states[step + 1], integers, others[b], scratch, 0, other, matrix, dfdt)
-            for i in range(n):
-                push_end[b, i] = other[i] - end[i]
+        _pushes(
+            address, t_mid, between, mid, lists, others, shared, scratch, kept, other, matrix, dfdt, push_mid
+        )
+        at = states[step + 1]
+        call_system(address, t1, at, integers, reals, scratch, 1, end, at_end, dfdt)
+        _pushes(address, t1, at, end, lists, others, shared, scratch, kept, other, matrix, dfdt, push_end)
         for i in range(n):
             for j in range(n):
                 same = 1.0 if i == j else 0.0

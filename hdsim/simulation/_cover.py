@@ -52,6 +52,8 @@ def cover(  # type: ignore[no-untyped-def]
     progress,
     blocks,
     others,
+    lists,
+    shared,
     near,
     slopes,
     beside,
@@ -63,8 +65,8 @@ def cover(  # type: ignore[no-untyped-def]
     to the span before. ``inside_at`` is the place in the reals of a time inside the current span, or -1. The
     state ``guarded`` (-1: none) may not grow beyond ``limit``. ``progress`` (2,) counts spans and samples and
     starts with zeros. After so many ``blocks`` of steps control goes back to Python, which hears of Ctrl-C.
-    Of models beside this one ``others`` (k, reals) holds the reals; ``near`` (k, n), ``slopes`` (k, n) and
-    the samples ``beside`` (k, m, n) are those of ``_beside.follow``.
+    Of models beside this one ``others`` (k, reals) holds the reals; ``lists``, ``shared``, ``near`` (k, n),
+    ``slopes`` (k, n) and the samples ``beside`` (k, m, n) are those of ``_beside.follow``.
 
     Returns RUNNING: call again; else what ``advance`` returned, NOT_FINITE_STATE or RUNAWAY.
     """
@@ -87,8 +89,8 @@ def cover(  # type: ignore[no-untyped-def]
             progress[SAMPLED] = end
         if others.shape[0] > 0 and counts[DONE] > 0:
             follow(
-                address, integers, reals, others, scratch, times, states, pieces, counts[DONE], fresh,
-                near, slopes, t_eval[first:end], beside[:, first:end],
+                address, integers, reals, others, lists, shared, scratch, times, states, pieces, counts[DONE],
+                fresh, near, slopes, t_eval[first:end], beside[:, first:end],
             )  # fmt: skip
         if status < 0:
             return status

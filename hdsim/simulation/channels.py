@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hdsim.drive import _layout as a
 from hdsim.drive import _mesh_layout, _teeth
-from hdsim.drive._assembly import observe
+from hdsim.drive._assembly import observe, observe_coordinates
 from hdsim.errors import InputError
 from hdsim.kernel import (
     COMMANDED_TORQUE,
@@ -173,6 +173,18 @@ class Observer:
         """The numbers of the scratch at some places, shape (samples, places)."""
         system = self.model.system
         rows = np.empty((len(times), len(places)))
+        if not np.setdiff1d(places, self._coordinates).size:
+            observe_coordinates(
+                times,
+                np.ascontiguousarray(states),
+                system.integers,
+                system.reals,
+                inside,
+                np.zeros(system.scratch_size),
+                places,
+                rows,
+            )
+            return rows
         observe(
             system.kernel.address,
             times,
@@ -187,6 +199,19 @@ class Observer:
             rows,
         )
         return rows
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """Channels that angles and velocities alone tell: a tenth of what the others cost."""
+        return tuple(name for name, f in self.formulas.items() if set(f.places) <= set(self._coordinates))
+
+    @property
+    def _coordinates(self) -> list[int]:
+        """Places of the scratch that are known before any torque."""
+        if self.model.rigid:
+            return []
+        bodies = (0, 1, 2) if self.model.has_ring else (0, 2)
+        return [first + body for first in (a.S_ANGLES, a.S_VELOCITIES) for body in bodies]
 
     @property
     def _first_state(self) -> int:

@@ -68,6 +68,14 @@ class Given:
         """Units by name."""
         return {name: _UNITS[name.rpartition("_")[2]] for name in self.names}
 
+    @property
+    def told(self) -> dict[str, str]:
+        """One line on every name."""
+        value, *derivatives = self.names
+        order = ("first", "second")
+        rates = {n: f"{order[k]} time derivative of {value}" for k, n in enumerate(derivatives)}
+        return {value: self.about} | rates
+
     def place(self, model: Model) -> tuple[int, int]:
         """Where in the system's reals the start of the signal's piece stands, and its four coefficients."""
         integers = model.system.integers

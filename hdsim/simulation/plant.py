@@ -63,7 +63,7 @@ class Plant:
         self.model = Model(
             drive,
             plant_parts(scenario),
-            load_inertia_kg_m2=scenario.load.inertia_kg_m2,
+            load_inertia_kg_m2=scenario.load.over(0.0)[1],
             motions={m.axis: m.signal for m in scenario.command.motions(drive.ratio) if m.axis == "output"},
             seed=scenario.run.seed,
         )
@@ -226,6 +226,7 @@ class Plant:
 
 
 def plant_parts(scenario: Scenario) -> list[Part]:
-    """Effects and gravity, and last the torques, so that their states follow all others."""
+    """Effects, gravity, an arm as it begins; last the torques, so that their states follow all others."""
     load = scenario.load
-    return [*scenario.effects.active().values(), *([load.gravity] if load.gravity else []), TorqueInputs()]
+    gravity, arm = [load.gravity] if load.gravity else [], load.over(0.0)[0][1:]
+    return [*scenario.effects.active().values(), *gravity, *arm, TorqueInputs()]

@@ -40,10 +40,14 @@ class Beside:
     Attributes:
         reals: their numbers, shape (k, reals); a run changes those that say where it is.
         y0: their initial states, shape (k, n).
+        integers: theirs, shape (k, integers).
+        shared: what each takes from the model instead of computing it, shape (k, 3); see ``_beside.follow``.
     """
 
     reals: Array
     y0: Array
+    integers: NDArray[np.int64]
+    shared: NDArray[np.int64]
 
 
 class _Block:
@@ -127,6 +131,8 @@ class _Block:
                 progress,
                 _BLOCKS,
                 others.reals,
+                others.integers,
+                others.shared,
                 near,
                 slopes,
                 beside,
@@ -287,7 +293,7 @@ def rodas4_through(
         guard: gives the run up.
         first_step: size of the first step; chosen when None.
         max_step: largest step.
-        others: models beside this one, with the same integers and without quadratures.
+        others: models beside this one, alike in all but numbers and without quadratures.
 
     Returns:
         Samples (n, m) up to where it came, and why it stopped. ``message`` has no hint at the cause.
@@ -298,7 +304,8 @@ def rodas4_through(
         empty = np.empty((0, len(t_eval)))
         return Integration(t_eval, empty, float(cuts[-1]), y0, None, True, "", beside=nothing)
     if others is None:
-        others = Beside(np.zeros((0, len(system.reals))), np.zeros((0, system.size)))
+        none = np.zeros((0, 3), dtype=np.int64)
+        others = Beside(np.zeros((0, len(system.reals))), np.zeros((0, system.size)), none, none)
     block = _Block(system, float(cuts[0]), y0, float(cuts[1]), rtol, atol, first_step, max_step, 64, stops)
     status, samples, count, beside = block.cover(cuts, inside_at, guard, t_eval, others)
     t = float(block.control[compiled.T])

@@ -127,6 +127,11 @@ class Run:
             further = np.concatenate([further, instants])
         return cuts(self.model.signals, self.duration_s, further)
 
+    def sample_times(self) -> Array:
+        """Times of the state table, s, shape (m,)."""
+        count = math.floor(self.duration_s * self.sample_rate_hz * (1 + 1e-12)) + 1
+        return np.arange(count) / self.sample_rate_hz
+
     def blocks(self, on_time: Callable[[float], object] | None = None) -> Iterator[dict[str, Table]]:
         """Integrate; yields tables by name as soon as a block of samples is complete.
 
@@ -143,8 +148,7 @@ class Run:
             if on_time is not None:
                 on_time(t)
 
-        count = math.floor(self.duration_s * self.sample_rate_hz * (1 + 1e-12)) + 1
-        samples = np.arange(count) / self.sample_rate_hz
+        samples = self.sample_times()
         spans, corners = self.spans(), stops(self.model, self.duration_s)
         reals = self.model.system.reals
         y = self.y0
@@ -218,7 +222,25 @@ class Run:
         self.model.system.reals[loop.place] = loop.controller.update(t, readings)
 
     def _block(self, times: Array, states: Array, inside: Array, held: Array) -> dict[str, Table]:
-        """The tables of a block of samples."""
+        """The tables of a block of samples, audited and searched for events."""
+        tables, rows = self.tables(times, states, inside, held)
+        least, part = self.observer.least_heat(rows)
+        self.audit.add(tables["state"], least, part, self.model.heat_accounts)
+        self.events += self.detector.feed(tables, self.audit.exchanged, self.statistics)
+        self.events += self.detector.friction(float(times[-1]), self.audit.gave_back)
+        return tables
+
+    def tables(
+        self, times: Array, states: Array, inside: Array, held: Array
+    ) -> tuple[dict[str, Table], Array]:
+        """The tables of a block of samples that follows the one before, and the scratch at each sample.
+
+        Args:
+            times: shape (m,), s.
+            states: shape (m, n).
+            inside: shape (m,), a time within each sample's smooth span.
+            held: shape (m,), torque that a sampled controller held at each sample, N m.
+        """
         if self.loop is None:
             rows = self.observer.samples(times, states, inside)
         else:
@@ -226,8 +248,6 @@ class Run:
             rows = self.observer.samples(times, states, inside, held, self.loop.place)
             self.model.system.reals[self.loop.place] = now
         table = self.observer.state_table(times, states, inside, rows)
-        least, part = self.observer.least_heat(rows)
-        self.audit.add(table, least, part, self.model.heat_accounts)
         tables = {"state": table}
         if self.model.sensors:
             self._history = _extended(self._history, table, times[0] - self.observer.memory)
@@ -236,9 +256,7 @@ class Run:
             chosen = np.round(times * self.sample_rate_hz).astype(int) % self.teeth_every == 0
             if chosen.any():
                 tables["teeth"] = self.observer.teeth_table(times[chosen], rows[chosen])
-        self.events += self.detector.feed(tables, self.audit.exchanged, self.statistics)
-        self.events += self.detector.friction(float(times[-1]), self.audit.gave_back)
-        return tables
+        return tables, rows
 
     def _fail(self, found: Any) -> None:
         """Record why the integration stopped."""

@@ -23,6 +23,7 @@ from hdsim.simulation.spans import cuts, stops
 
 if TYPE_CHECKING:
     from hdsim.drive.model import Model
+    from hdsim.simulation.rosenbrock import Beside
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,13 @@ def sample(model: Model, times: Array, channels: Sequence[str], *, rtol: float =
 
 
 def samples_beside(
-    model: Model, others: Sequence[Model], times: Array, channels: Sequence[str], *, rtol: float = 1e-6
+    model: Model,
+    others: Sequence[Model],
+    times: Array,
+    channels: Sequence[str],
+    *,
+    rtol: float = 1e-6,
+    atol: float | None = None,
 ) -> list[dict[str, Array]]:
     """Run a model, and others that differ so little from it that they may be linearised beside it.
 
@@ -60,6 +67,7 @@ def samples_beside(
         times: see ``sample``.
         channels: likewise.
         rtol: likewise.
+        atol: absolute tolerance of every state in its unit; rtol times each state's scale when None.
 
     Returns:
         What ``sample`` returns, of the model and of each other one.
@@ -68,7 +76,7 @@ def samples_beside(
         InputError: there is no such channel.
         RunFailed: the integration stopped before the end; the message says why.
     """
-    from hdsim.simulation.rosenbrock import Beside, rodas4_through
+    from hdsim.simulation.rosenbrock import rodas4_through
 
     times = np.ascontiguousarray(times, dtype=np.float64)
     sensors = {c: s for c, s in model.sensors.items() if c in channels}
@@ -81,14 +89,14 @@ def samples_beside(
     spans = cuts(model.signals, end)
     beside = None
     if others:
-        beside = Beside(np.stack([o.system.reals for o in others]), np.stack([o.system.y0 for o in others]))
+        beside = _beside(model, others)
     found = rodas4_through(
         system,
         spans,
         system.y0,
         grid,
         rtol=rtol,
-        atol=rtol * system.scale,
+        atol=rtol * system.scale if atol is None else atol,
         stops=stops(model, end),
         inside_at=layout.INSIDE,
         guard=speed_guard(model),
@@ -136,6 +144,33 @@ def alike(model: Model, other: Model, end_s: float) -> bool:
         and model.sensors.keys() == other.sensors.keys()
         and all(a is b or np.array_equal(a.corners(0.0, end_s), b.corners(0.0, end_s)) for a, b in pairs)
     )
+
+
+def _beside(model: Model, others: Sequence[Model]) -> Beside:
+    """Numbers of the models beside one, each with the mesh's result as given where the mesh is the same.
+
+    The mesh, the dearest part where it has teeth, sees the angles, its own numbers and the kinematic error
+    alone: a model with another inertia, friction or gain need not compute it again.
+    """
+    from hdsim.drive import _mesh_layout
+    from hdsim.drive._mesh import given_mesh
+    from hdsim.simulation.rosenbrock import Beside
+
+    system = model.system
+    reals = np.stack([other.system.reals for other in others])
+    integers = np.stack([other.system.integers for other in others])
+    at = int(system.integers[layout.MESH_AT])
+    shared = np.tile([layout.S_MESH, -1, _mesh_layout.RESULT_SIZE], (len(others), 1))
+    if not model.rigid:
+        seen = np.ones(len(system.reals), dtype=bool)
+        seen[layout.INSIDE : layout.INERTIA + 3] = seen[layout.HOUSING_INERTIA] = False
+        # The elements' numbers come first; twists', signals' and the mesh's own follow.
+        lists = system.integers[layout.LISTS + layout.PER_ELEMENT * system.integers[layout.ELEMENTS] :]
+        seen[layout.PARAMETERS : min([at, *lists[1::2]])] = False
+        same = (reals[:, seen] == system.reals[seen]).all(axis=1)
+        shared[same, 1] = at
+        integers[same, layout.MESH_ADDRESS] = given_mesh.address
+    return Beside(reals, np.stack([other.system.y0 for other in others]), integers, shared)
 
 
 def _reaching_back(times: Array, memory_s: float) -> Array:

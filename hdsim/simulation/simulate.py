@@ -28,7 +28,11 @@ _PACKAGES = ("hdsim", "numpy", "scipy", "numba", "control", "mcap", "pydantic")
 
 
 def simulate(
-    scenario: Scenario, *, on_time: Callable[[float], object] | None = None, strict: bool = True
+    scenario: Scenario,
+    *,
+    on_time: Callable[[float], object] | None = None,
+    strict: bool = True,
+    sensitivities: Sequence[str] = (),
 ) -> Recording:
     """Simulate a scenario and keep the result in memory.
 
@@ -36,13 +40,20 @@ def simulate(
         scenario: what to simulate.
         on_time: called now and then with the simulated time that has been reached, s.
         strict: raise when the run stops early; else return what was computed, with the event that says why.
+        sensitivities: dotted names of numbers of the scenario; ``result.sensitivities[name][channel]`` is
+            then how the channel changes with the number (``hdsim.simulation.sensitivities``).
 
     Returns:
         The recording: tables ``state`` and ``teeth``, static arrays, events and provenance.
 
     Raises:
         RunFailed: the run stopped early; its ``recording`` holds what was computed.
+        InputError: one of the numbers has no sensitivity.
     """
+    from hdsim.simulation.sensitivities import derivatives, models_beside
+
+    # First of all: what has no derivative is said before the run.
+    beside = models_beside(scenario, sensitivities) if sensitivities else None
     run = build_run(scenario)
     started = time.perf_counter()
     recording = run.record(on_time)
@@ -54,6 +65,8 @@ def simulate(
         error = RunFailed(run.failure)
         error.recording = recording
         raise error
+    if beside is not None and not run.failure:
+        recording.sensitivities = derivatives(beside, scenario, recording)
     return recording
 
 

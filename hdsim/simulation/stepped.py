@@ -112,7 +112,7 @@ class SteppedPlant:
         self.inputs = {name: unit for one in self._given for name, unit in one.units.items()}
         self.formulas = {n: f for n, f in self._observer.formulas.items() if n not in self.inputs}
         self.outputs = {name: formula.unit for name, formula in self.formulas.items()}
-        self.about = {one.names[0]: one.about for one in self._given}
+        self.about = {name: about for one in self._given for name, about in one.told.items()}
         self.about |= {name: formula.description for name, formula in self.formulas.items()}
         self._start = SteppedState(0.0, y0, None, dict.fromkeys(self.inputs, 0.0))
         self.reset()

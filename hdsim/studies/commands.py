@@ -78,7 +78,8 @@ def presets(name: str | None) -> None:
     from rich.table import Table
 
     from hdsim.console import console
-    from hdsim.drive.presets import catalogue_figures, preset_names
+    from hdsim.drive.parameters import Drive
+    from hdsim.drive.presets import catalogue_figures, outside, preset_names
     from hdsim.drive.printed import Figure
     from hdsim.drive.printed_gear import printed_gear
     from hdsim.drive.ratings import ratings_of_preset
@@ -128,6 +129,20 @@ def presets(name: str | None) -> None:
             f"{figures.stiffness_k3.value:g}",
             f"{figures.accuracy.value * 3437.7467707849396:.2g}",
         )
+    for known, one in outside().items():
+        try:
+            drive = Drive.model_validate({"preset": known})
+        except ValueError as error:
+            raise InputError(f"preset {known} of {one.distribution}: {error}") from None
+        k1, k3 = drive.torsion.stiffness_k1_nm_per_rad, drive.torsion.stiffness_k3_nm_per_rad
+        table.add_row(
+            f"{known} ({one.distribution})",
+            f"{abs(drive.ratio):g}",
+            f"{drive.rated_torque_nm:g}",
+            f"{k1:g}",
+            f"{k3:g}",
+            "",
+        )
     console().print(table)
 
 
@@ -137,13 +152,13 @@ def benched(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, 
     Raises:
         InputError: neither a preset nor a scenario that can be read.
     """
-    from hdsim.drive.presets import catalogue_figures, preset_names
+    from hdsim.drive.presets import catalogue_figures, outside, preset_names
     from hdsim.errors import InputError
-    from hdsim.studies.bench.report import CATALOGUE_EFFECTS, catalogue_lines
+    from hdsim.studies.bench.report import CATALOGUE_EFFECTS
 
-    if given in preset_names():
+    if given in (*preset_names(), *outside()):
         section = {"preset": given}
-        return given, section, dict(CATALOGUE_EFFECTS), {}, catalogue_lines(catalogue_figures(given))
+        return given, section, dict(CATALOGUE_EFFECTS), {}, _lines(given)
     path = Path(given)
     if not path.exists():
         try:
@@ -156,9 +171,17 @@ def benched(given: str) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, 
     kept = ("method", "rtol", "atol", "max_step_s", "seed")
     run = {name: value for name in kept if (value := getattr(scenario.run, name)) is not None}
     preset = scenario.drive.preset
-    lines = {} if preset is None else catalogue_lines(catalogue_figures(preset))
+    lines = {} if preset is None else _lines(preset)
     effects = {name: effect.model_dump() for name, effect in scenario.effects.active().items()}
     return path.stem, scenario.drive.model_dump(), effects, run, lines
+
+
+def _lines(preset: str) -> dict[str, Line]:
+    """The catalogue's lines of a preset; none of those of other packages."""
+    from hdsim.drive.presets import catalogue_figures, outside
+    from hdsim.studies.bench.report import catalogue_lines
+
+    return {} if preset in outside() else catalogue_lines(catalogue_figures(preset))
 
 
 def _print(rows: list[Row], title: str) -> None:

@@ -21,6 +21,7 @@ def diagnose(
     load: Any,
     zeros: Any,
     force: bool,
+    black_box: bool,
 ) -> int:
     """Find what a model is missing against measured records.
 
@@ -34,7 +35,10 @@ def diagnose(
 
     scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
-        found = run(records, scenario, holdout=held, load=load, zeros=zeros, force=force, on_step=tell)
+        found = run(
+            records, scenario, holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
+            on_step=tell,
+        )  # fmt: skip
         tell("finding the next experiment, writing the report")
         told = gather(found)
         report = save(found, model, out, told)

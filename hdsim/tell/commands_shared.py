@@ -45,6 +45,11 @@ def measured_options(command: F) -> F:
                 help="Whether torque sensors have one zero in all records, or one in each [campaign].",
             ),
             click.option("--force", is_flag=True, help="Go on in spite of errors in the data."),
+            click.option(
+                "--black-box",
+                is_flag=True,
+                help="Also say what boosted trees leave of the held-out data (hdsim[baseline]).",
+            ),
         )
     ):
         command = option(command)
@@ -67,6 +72,7 @@ def opened(
         InputError: a record is both, a file cannot be read, or the folder cannot be written.
     """
     import hdsim
+    from hdsim.console import reading
     from hdsim.estimate.records import record_from
     from hdsim.tell.staging import staged
 
@@ -76,8 +82,9 @@ def opened(
     scenario = hdsim.load_scenario(model)
     with staged(out, keep=False):
         pass
-    records, held = (
-        [record_from(hdsim.import_recording(path, mapping), path.name) for path in paths]
-        for paths in (measured, holdout)
-    )
-    return scenario, records, held
+
+    def read(path: Path) -> Record:
+        with reading(path) as tell:
+            return record_from(hdsim.import_recording(path, mapping, tell), path.name)
+
+    return scenario, [read(path) for path in measured], [read(path) for path in holdout]

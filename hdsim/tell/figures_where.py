@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hdsim.diagnosis.evidence import PlaceEvidence
-    from hdsim.diagnosis.orders import Line
+    from hdsim.estimate.orders import Line
     from hdsim.estimate.records import Array
     from hdsim.tell.findings import Compared, Findings
 

@@ -32,6 +32,7 @@ def fit(
     load: Any,
     zeros: Any,
     force: bool,
+    black_box: bool,
 ) -> int:
     """Fit a scenario's numbers to measured records.
 
@@ -48,7 +49,7 @@ def fit(
     with Progress() as tell:
         found = hdsim.fit(
             records, scenario, holdout=held, free=free, fix=fix, apart=apart, load=load, zeros=zeros,
-            force=force, on_step=tell,
+            force=force, black_box=black_box, on_step=tell,
         )  # fmt: skip
         tell("writing the report")
         page = save_fit(found, model, out)
@@ -65,6 +66,7 @@ def _show(result: FitResult) -> None:
     from rich.text import Text
 
     from hdsim.console import console
+    from hdsim.tell.beside import baselines
     from hdsim.tell.fit_report import GAP_HEAD, gap_rows, summary
     from hdsim.tell.words import named_number, shown
 
@@ -93,6 +95,8 @@ def _show(result: FitResult) -> None:
     for row in gap_rows(result):
         gaps.add_row(*row)
     out.print(gaps)
+    for said in baselines(result.gap):
+        out.print(Text(said), highlight=False)
     for problem in result.data_problems:
         if problem.severity != "info":
             said = f"{problem.severity}: {problem.record}: {problem.channel}: {problem.message}"

@@ -15,9 +15,10 @@ from hdsim.estimate.outcome import FitResult, result_of
 from hdsim.estimate.write import FITTED, scenario_text
 from hdsim.plot import units
 from hdsim.tell import fit_figures
+from hdsim.tell.beside import baselines
 from hdsim.tell.staging import staged
 from hdsim.tell.tables import numbers_table, table
-from hdsim.tell.words import named_number, shown, spoken, unit_of
+from hdsim.tell.words import named_number, shown, spoken, started, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,6 +117,7 @@ def page(found: Estimation, result: FitResult, pictures: dict[str, str]) -> str:
     said = html.escape(summary(result))
     numbers = numbers_table(result.numbers, result.moved)
     gaps = table(GAP_HEAD, gap_rows(result), range(2, len(GAP_HEAD)))
+    gaps += "".join(f"<p>{html.escape(started(line))}.</p>" for line in baselines(result.gap))
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.estimate.records import CHANNELS
+from hdsim.log.mapping import MEASURED
 from hdsim.recording import Column, Event, Recording, Table
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
     time = record.time
     columns: dict[str, dict[str, Column]] = {"measured": {}}
     for channel, values in record.channels.items():
-        columns["measured"][channel] = Column(values, CHANNELS[channel], "as measured")
+        columns["measured"][channel] = Column(values, MEASURED[channel], "as measured")
     ideal = predictor.motor_angle / predictor.ratio
     stages = {stage: bench.residuals(found, drift=True) for stage, found in diagnosis.predictions.items()}
     for k, series in enumerate(bench.series):
@@ -65,7 +65,7 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
         for stage, residuals in stages.items():
             values = series.measured - residuals[k]
             table = columns.setdefault(stage, {})
-            unit = CHANNELS[series.channel]
+            unit = MEASURED[series.channel]
             table[series.channel] = Column(values, unit, f"model, {stage}")
             left = np.where(record.trusted[series.channel], residuals[k], np.nan)
             table[f"{series.channel}_error"] = Column(left, unit, f"measured less model, {stage}")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdsim.tell import figures, sections
+from hdsim.tell.beside import baselines, last_model
 from hdsim.tell.figures_where import located_figure
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import GAP_HEAD, gap_rows, section, table
@@ -30,12 +31,13 @@ LONG = 150
 _CAPTIONS = {
     "gap": "Root-mean-square difference between measurement and model on data that no fit has seen, in the "
     "unit of each channel (in brackets: as a share of the model as given). Whiskers: 95 % intervals over "
-    "blocks of time. Dashed line: noise of the sensor, below which no model can come.",
+    "blocks of time. Dashed line: noise of the sensor, as neighbouring readings differ by it. It is a mark "
+    "and no bound: errors that last over many readings are larger, and a model may foretell a part of them.",
     "located": "How much of what the re-fitted model leaves is a function of one quantity, checked on "
     "blocks of time left out of the fit; the shares of related quantities overlap. Grey: measured samples. "
     "Orange: what the re-fitted model leaves. Green: what is left with what was found.",
     "traces": "The stretch of held-out data in which the model as given is farthest off. Grey band: "
-    "twice the sensor's noise to either side; what stays inside is explained. Sensors' offsets are taken "
+    "twice the sensor's noise to either side; what stays inside may be noise. Sensors' offsets are taken "
     "out.",
     "whole": "The same difference over the whole record. Shaded: held out, no fit has seen it.",
     "curve": "The curve with the 95 % interval of each corner. What the model's own numbers "
@@ -94,6 +96,7 @@ def _page(found: Findings, pictures: dict[str, str]) -> str:
         section(
             "How far off the model is, before and after",
             pictures.get("gap", "<p>No data were held out, so there is no gap to show.</p>")
+            + _beside(verdict)
             + (_as_numbers(verdict) if verdict.gap else ""),
         ),
         why(found),
@@ -114,6 +117,11 @@ def _page(found: Findings, pictures: dict[str, str]) -> str:
         sections.written(verdict, pictures),
     ]
     return "\n".join(part for part in [*parts, "</main></body></html>"] if part)
+
+
+def _beside(verdict: Verdict) -> str:
+    listed = "".join(f"<li>{html.escape(line)}</li>" for line in baselines(verdict.gap, last_model(verdict)))
+    return f"<p>How much of it can be learnt from the same samples:</p><ul>{listed}</ul>" if listed else ""
 
 
 def _as_numbers(verdict: Verdict) -> str:

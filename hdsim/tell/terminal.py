@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hdsim.console import console
 from hdsim.tell.because import conditions, weighings
+from hdsim.tell.beside import baselines, last_model
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import gap_rows
 from hdsim.tell.wording import KINDS, headline, sureness
@@ -92,6 +93,8 @@ def show(found: Findings, terminal: Console | None = None) -> None:
         for channel, unit, *numbers in gap_rows(verdict):
             table.add_row(f"{channel} ({unit})", *numbers)
         out.print(table)
+        for said in baselines(verdict.gap, last_model(verdict)):
+            line(said)
     for title, head, rows in _reasons(verdict):
         table = Table(box=SIMPLE_HEAD, title=title, **_STYLE)
         for name in head:

@@ -62,7 +62,7 @@ CASES: dict[str, tuple[str | bytes, int, str, str]] = {
     "unknown mesh": (changed("model: teeth", "model: tooth"), 7, "drive.mesh.model", "expected one of teeth, tabulated, lumped, rigid"),
     "command without its type": (changed("    type: torque\n", ""), 12, "command.motor.type", "found nothing, expected one of torque, position"),
     "unknown command": (changed("type: torque", "type: torqe"), 13, "command.motor.type", "did you mean 'torque'?"),
-    "missing section": (changed("load:\n  inertia_kg_m2: 0.1\n", ""), 1, "load", "found nothing, expected a mapping with inertia_kg_m2"),
+    "missing section": (changed("load:\n  inertia_kg_m2: 0.1\n", ""), 1, "load", "found nothing, expected a mapping with arm, inertia_kg_m2"),
     "key of another choice": (changed("model: teeth\n", "model: rigid\n"), 8, "drive.mesh.engagement", "found an unknown key"),
     "unknown preset": (changed("seed-2021", "seed-2022"), 2, "drive", "did you mean 'seed-2021'?"),
     "wrong tooth difference": (changed("  mesh:", "  geometry: {circular_spline_teeth: 203}\n  mesh:"), 6, "drive.geometry", "exceed flexspline_teeth by 2"),

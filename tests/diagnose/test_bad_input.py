@@ -182,7 +182,7 @@ def test_a_short_record_is_told_how_long_it_must_be(ask, count):
 @pytest.mark.parametrize(
     ("data", "mapping", "words"),
     [
-        ("Dear all,\nit squeaks.\n", TORQUE, ["data.csv", "no column", "Dear all"]),
+        ("Dear all,\nit squeaks.\n", TORQUE, ["data.csv", "no line holds numbers", "Dear all"]),
         (bytes(range(128, 256)) * 30, TORQUE, ["data.csv", "cannot be read as CSV"]),
         ("", TORQUE, ["data.csv: it is empty"]),
         ("t,motor,torque\n", TORQUE, ["data.csv: it is empty"]),

@@ -8,11 +8,11 @@ import pytest
 from diagnose_bench import rigid_record, scenario
 
 from hdsim.diagnosis.contest import _linear, _Point, contest
-from hdsim.diagnosis.orders import order_lines
 from hdsim.diagnosis.search import left_of
 from hdsim.diagnosis.traces import screen
 from hdsim.estimate.fit import sharpened
 from hdsim.estimate.opening import bench_for
+from hdsim.estimate.orders import order_lines
 from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import state_of
 

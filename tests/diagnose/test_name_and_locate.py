@@ -7,12 +7,12 @@ from diagnose_bench import rigid_record, scenario
 
 import hdsim
 from hdsim.diagnosis.name import simplest_first
-from hdsim.diagnosis.orders import order_lines
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.numbers import GAIN_PRIOR
+from hdsim.estimate.orders import order_lines
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Record

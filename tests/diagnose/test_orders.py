@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hdsim.diagnosis.late import age_by_lines
-from hdsim.diagnosis.orders import order_lines
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.orders import order_lines
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record
 

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from harness import FakeBuilder, Model
 from pydantic import ValidationError
 from scipy.integrate import quad, solve_ivp
 
@@ -32,12 +31,13 @@ from hdsim.effects.unbalance import Unbalance
 from hdsim.effects.wave_generator_compliance import WaveGeneratorCompliance
 from hdsim.effects.wave_generator_eccentricity import WaveGeneratorEccentricity
 from hdsim.parts import Effect
+from hdsim.testing.alone import Alone, Collector
 
 ARCMIN = math.radians(1 / 60)
 RATIO = -100.0
 
 
-def at(model: Model, **values: float) -> np.ndarray:
+def at(model: Alone, **values: float) -> np.ndarray:
     """Outputs of a model at the named inputs, e.g. ``MOTOR_VELOCITY=3``."""
     inputs = model.initial
     for name, value in values.items():
@@ -46,7 +46,7 @@ def at(model: Model, **values: float) -> np.ndarray:
 
 
 def test_default_kinematic_error_has_the_catalogues_accuracy_and_orders() -> None:
-    model = Model(KinematicError())
+    model = Alone(KinematicError())
     n = 20000
     motor = np.arange(n) / n * 100 * 2 * math.pi  # one output turn without load
     error = np.array([model.error(m, m / RATIO)[0] for m in motor])
@@ -71,18 +71,18 @@ def test_wave_generator_eccentricity_equals_the_two_lobes_moment_balance() -> No
             tangent = np.array([-math.sin(lobe), math.cos(lobe)])
             turned += share * (offset @ tangent) / 20e-3
         # the offset of -y turns lobe 1 by -d cos(motor): the effect's phase is a quarter turn on
-        assert Model(effect).error(motor + 1.5 * math.pi, 0.0)[0] == pytest.approx(turned, abs=1e-12)
+        assert Alone(effect).error(motor + 1.5 * math.pi, 0.0)[0] == pytest.approx(turned, abs=1e-12)
 
 
 def test_output_eccentricity_is_one_period_per_output_turn() -> None:
-    model = Model(OutputEccentricity(eccentricity_um=5, radius_mm=25))
+    model = Alone(OutputEccentricity(eccentricity_um=5, radius_mm=25))
     values = [model.error(17.0 * x, x)[0] for x in np.linspace(0, 2 * math.pi, 9)]
     assert np.allclose(values, 2e-4 * np.sin(np.linspace(0, 2 * math.pi, 9)), atol=1e-15)
 
 
 def test_damaged_tooth_is_felt_by_both_lobes_with_a_gaussians_width() -> None:
     width = math.radians(6)
-    model = Model(DamagedTooth(amplitude_arcmin=-0.3, width_deg=6, position_deg=30))
+    model = Alone(DamagedTooth(amplitude_arcmin=-0.3, width_deg=6, position_deg=30))
     start = math.radians(30)
     for turn in (0.0, math.pi, 2 * math.pi):
         assert model.error(start + turn + 0.5, 0.5)[0] == pytest.approx(
@@ -99,14 +99,14 @@ def test_friction_of_the_catalogue_set_gives_the_measured_no_load_torques() -> N
         ((InputCoulombViscous(),), 0.0),
         ((InputCoulombViscous(viscous_nm_s_per_rad=0),), 3.5e-4),
     ):
-        model = Model(*effects, base=base)
+        model = Alone(*effects, base=base)
         for rpm, torque in ((2000, 0.105), (3500, 0.160)):
             speed = rpm * 2 * math.pi / 60
             assert -at(model, MOTOR_VELOCITY=speed)[k.MOTOR_TORQUE] == pytest.approx(torque, rel=0.01)
 
 
 def test_load_side_friction_opposes_the_output_only() -> None:
-    model = Model(LoadSideFriction(coulomb_nm=2, viscous_nm_s_per_rad=3))
+    model = Alone(LoadSideFriction(coulomb_nm=2, viscous_nm_s_per_rad=3))
     outputs = at(model, OUTPUT_VELOCITY=-1.5, MOTOR_VELOCITY=40)
     assert outputs[k.OUTPUT_TORQUE] == pytest.approx(2 + 4.5)
     assert outputs[k.MOTOR_TORQUE] == 0
@@ -117,7 +117,7 @@ def test_stribeck_bump_peaks_near_static_friction_and_vanishes_at_speed() -> Non
     effect = StribeckFriction(
         extra_static_nm=0.01, stribeck_velocity_rad_per_s=5, smoothing_velocity_rad_per_s=0.01
     )
-    model = Model(effect)
+    model = Alone(effect)
     speeds = np.array([0.1, 5.0, 50.0])
     torque = [at(model, MOTOR_VELOCITY=w)[k.INPUT_FRICTION] for w in speeds]
     assert np.allclose(torque, 0.01 * np.exp(-((speeds / 5) ** 2)), rtol=1e-6, atol=1e-20)
@@ -126,7 +126,7 @@ def test_stribeck_bump_peaks_near_static_friction_and_vanishes_at_speed() -> Non
 @pytest.mark.parametrize("speed", [0.05, 2.0, -8.0, 60.0])
 def test_lugre_settles_on_the_stribeck_curve_at_any_steady_speed(speed: float) -> None:
     effect = LugreFriction(viscous_nm_s_per_rad=1e-3)
-    model = Model(effect)
+    model = Alone(effect)
     slide = 40 * effect.static_nm / effect.stiffness_nm_per_rad
     times = np.linspace(0, slide / abs(speed), 50)
     z = model.follow(k.MOTOR_ANGLE, lambda t: speed * t, lambda t: speed, times)[0, -1]
@@ -138,7 +138,7 @@ def test_lugre_settles_on_the_stribeck_curve_at_any_steady_speed(speed: float) -
 
 
 def test_lugre_presliding_is_a_spring_of_the_bristles() -> None:
-    model = Model(LugreFriction(stiffness_nm_per_rad=20, damping_nm_s_per_rad=0))
+    model = Alone(LugreFriction(stiffness_nm_per_rad=20, damping_nm_s_per_rad=0))
     small = 1e-6  # rad: far below the break-away displacement of 2e-3
     z = model.follow(k.MOTOR_ANGLE, lambda t: small * t, lambda t: small, np.linspace(0, 1, 3))[0, -1]
     assert z == pytest.approx(small, rel=1e-3)
@@ -150,7 +150,7 @@ def test_lugre_presliding_is_a_spring_of_the_bristles() -> None:
 def test_lugre_with_constant_bristle_damping_would_create_energy_where_the_fading_one_does_not() -> None:
     # The state that makes the heat smallest, s = 2, on a drive with strong damping: the bound is sharp there.
     effect = LugreFriction(damping_nm_s_per_rad=1.0, static_nm=0.064, coulomb_nm=0.032)
-    model = Model(effect)
+    model = Alone(effect)
     speeds = np.geomspace(1e-3, 1e3, 300)
 
     def heat(speed: float) -> float:
@@ -170,7 +170,7 @@ def cycle(
     effect: TorsionalHysteresisMaxwell, amplitude: float, rate: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Twist and torque over two triangle cycles from rest, 400 samples a quarter, shape (n,) each."""
-    model = Model(effect)
+    model = Alone(effect)
     corners = amplitude * np.array([0, 1, 0, -1, 0, 1, 0, -1, 0.0])
     own, twist, torque = model.initial[k.OWN :], [0.0], [0.0]
     for start, stop in pairwise(corners):
@@ -231,27 +231,27 @@ def test_maxwell_default_stays_within_the_catalogues_hysteresis_loss() -> None:
 
 
 def test_duhem_branch_is_the_exponential() -> None:
-    model = Model(TorsionalHysteresisDuhem(stiffness_nm_per_rad=4000, saturation_torque_nm=2))
+    model = Alone(TorsionalHysteresisDuhem(stiffness_nm_per_rad=4000, saturation_torque_nm=2))
     times = np.linspace(0, 1, 20)
     z = model.follow(k.TWIST, lambda t: 1e-3 * t, lambda t: 1e-3, times)[0]
     assert np.allclose(z, 2 * (1 - np.exp(-2000 * 1e-3 * times)), atol=1e-7)
     slower = model.follow(k.TWIST, lambda t: 1e-5 * t, lambda t: 1e-5, 100 * times)[0]
     assert np.allclose(z, slower, atol=1e-6)
-    by_twist = Model(TorsionalHysteresisDuhem(saturation_torque_nm=2, saturation_twist_mrad=0.5))
+    by_twist = Alone(TorsionalHysteresisDuhem(saturation_torque_nm=2, saturation_twist_mrad=0.5))
     assert np.allclose(by_twist.follow(k.TWIST, lambda t: 1e-3 * t, lambda t: 1e-3, times)[0], z, atol=1e-9)
 
 
 def test_backlash_widens_by_half_on_each_side() -> None:
-    build = FakeBuilder()
+    build = Collector()
     OutputBacklash(backlash_arcmin=3).contribute(build)
     assert build.half_gap == pytest.approx(1.5 * ARCMIN)
 
 
 def test_cogging_does_no_work_over_a_period_and_the_windings_share_follows_the_load() -> None:
-    cogging = Model(MotorTorqueRipple(components=(RippleComponent(order=24, cogging_nm=0.01, phase_deg=17),)))
+    cogging = Alone(MotorTorqueRipple(components=(RippleComponent(order=24, cogging_nm=0.01, phase_deg=17),)))
     work, _ = quad(lambda a: at(cogging, MOTOR_ANGLE=a)[k.MOTOR_TORQUE], 0, 2 * math.pi / 24)
     assert work == pytest.approx(0, abs=1e-10)
-    share = Model(MotorTorqueRipple(components=(RippleComponent(order=6, share=0.02),)))
+    share = Alone(MotorTorqueRipple(components=(RippleComponent(order=6, share=0.02),)))
     angle = math.pi / 12
     assert at(share, MOTOR_ANGLE=angle, TRANSMITTED_TORQUE=50)[k.MOTOR_TORQUE] == pytest.approx(
         0.02 * 50 / RATIO
@@ -262,16 +262,16 @@ def test_without_a_load_the_windings_ripple_is_a_share_of_the_friction() -> None
     ripple = MotorTorqueRipple(components=(RippleComponent(order=6, share=0.02),))
     friction = InputCoulombViscous(coulomb_nm=0.03, viscous_nm_s_per_rad=2e-4)
     place = {"MOTOR_ANGLE": math.pi / 12, "MOTOR_VELOCITY": 200.0}
-    alone = at(Model(friction, base=1e-4), **place)[k.MOTOR_TORQUE]
-    together = at(Model(friction, ripple, base=1e-4), **place)[k.MOTOR_TORQUE]
+    alone = at(Alone(friction, base=1e-4), **place)[k.MOTOR_TORQUE]
+    together = at(Alone(friction, ripple, base=1e-4), **place)[k.MOTOR_TORQUE]
     assert alone == pytest.approx(-(0.03 + 3e-4 * 200))
     assert together == pytest.approx(0.98 * alone)
 
 
 def soak(
     effect: ThermalFriction, speed: float, base: float, duration: float
-) -> tuple[np.ndarray, np.ndarray, Model]:
-    model = Model(effect, base=base)
+) -> tuple[np.ndarray, np.ndarray, Alone]:
+    model = Alone(effect, base=base)
     times = np.linspace(0, duration, 40)
     return times, model.follow(k.MOTOR_ANGLE, lambda t: 0.0, lambda t: speed, times)[0], model
 
@@ -302,21 +302,21 @@ def test_default_temperature_dependence_reproduces_palmgrens(degc: float, rpm: f
     speed = rpm * 2 * math.pi / 60
     at_20 = 0.032 + 3.5e-4 * speed
     palmgren = at_20 * nu ** (2 / 3)
-    model = Model(InputCoulombViscous(viscous_nm_s_per_rad=0), ThermalFriction(), base=3.5e-4)
+    model = Alone(InputCoulombViscous(viscous_nm_s_per_rad=0), ThermalFriction(), base=3.5e-4)
     inputs = model.initial
     inputs[k.MOTOR_VELOCITY], inputs[k.OWN] = speed, degc
     assert -model(inputs)[0][k.MOTOR_TORQUE] == pytest.approx(palmgren, rel=0.12)
 
 
 def test_unbalance_is_a_pendulums_weight() -> None:
-    model = Model(Unbalance(output_kg_m=0.2))
+    model = Alone(Unbalance(output_kg_m=0.2))
     assert at(model, OUTPUT_ANGLE=0.0)[k.OUTPUT_TORQUE] == pytest.approx(-0.2 * 9.80665)
     rise = at(model, OUTPUT_ANGLE=math.pi / 2)[k.STORED] - at(model, OUTPUT_ANGLE=-math.pi / 2)[k.STORED]
     assert rise == pytest.approx(2 * 0.2 * 9.80665)
 
 
 def test_load_dependent_loss_is_a_share_of_the_load_in_both_directions_of_power() -> None:
-    model = Model(LoadDependentLoss(coefficient=0.05))
+    model = Alone(LoadDependentLoss(coefficient=0.05))
     for load in (52.0, -52.0):
         for speed in (100.0, -100.0):
             torque = at(model, TRANSMITTED_TORQUE=load, MOTOR_VELOCITY=speed)[k.MOTOR_TORQUE]
@@ -324,21 +324,21 @@ def test_load_dependent_loss_is_a_share_of_the_load_in_both_directions_of_power(
 
 
 def test_cubic_spring_is_the_derivative_of_its_energy() -> None:
-    model = Model(StiffnessNonlinearity(cubic_nm_per_rad3=1e9))
+    model = Alone(StiffnessNonlinearity(cubic_nm_per_rad3=1e9))
     assert at(model, TWIST=2e-3)[k.TWIST_TORQUE] == pytest.approx(-8.0)
     work, _ = quad(lambda x: -at(model, TWIST=x)[k.TWIST_TORQUE], 0, 2e-3)
     assert at(model, TWIST=2e-3)[k.STORED] == pytest.approx(work)
 
 
 def wind_up(effect: Effect, torque: float) -> float:
-    build = FakeBuilder()
+    build = Collector()
     effect.contribute(build)
     return float(build.compliances[0](np.array([torque]))[0])
 
 
 @pytest.mark.parametrize("ratio", [-100.0, 51.0])
 def test_a_loss_by_direction_gives_the_two_efficiencies(ratio: float) -> None:
-    model = Model(LoadDependentLoss(coefficient=0.25, back_driving_coefficient=0.1), ratio=ratio)
+    model = Alone(LoadDependentLoss(coefficient=0.25, back_driving_coefficient=0.1), ratio=ratio)
     for speed, load in ((150.0, 40.0), (-150.0, 40.0), (150.0, -40.0), (-150.0, -40.0)):
         # At steady speed the motor carries the load's torque over the ratio and the friction.
         motor = load / ratio - at(model, MOTOR_VELOCITY=speed, TRANSMITTED_TORQUE=load)[k.MOTOR_TORQUE]
@@ -351,8 +351,8 @@ def test_a_loss_by_direction_gives_the_two_efficiencies(ratio: float) -> None:
 
 def test_a_loss_without_directions_is_the_same_in_both() -> None:
     both = [
-        Model(LoadDependentLoss(coefficient=0.1)),
-        Model(LoadDependentLoss(coefficient=0.1, back_driving_coefficient=0.1)),
+        Alone(LoadDependentLoss(coefficient=0.1)),
+        Alone(LoadDependentLoss(coefficient=0.1, back_driving_coefficient=0.1)),
     ]
     for speed in (-0.3, 0.2, 90.0):
         torques = [at(m, MOTOR_VELOCITY=speed, TRANSMITTED_TORQUE=-7.0)[k.MOTOR_TORQUE] for m in both]
@@ -383,7 +383,7 @@ def test_wave_generator_wind_up_integrates_its_stiffness_at_the_input() -> None:
 @pytest.mark.parametrize(("flexspline", "circular"), [(200, 202), (160, 162)])
 def test_base_flexibility_equals_the_tooth_counts_lever(flexspline: int, circular: int) -> None:
     """Circular spline fixed: turning it by one turn turns the flexspline by z_c/z_f with the motor locked."""
-    build = FakeBuilder(ratio=-flexspline / (circular - flexspline))
+    build = Collector(ratio=-flexspline / (circular - flexspline))
     BaseFlexibility(stiffness_nm_per_rad=1e5).contribute(build)
     expected = (circular / flexspline) ** 2 * 40 / 1e5
     assert build.compliances[0](np.array([40.0]))[0] == pytest.approx(expected)

@@ -7,13 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
-from harness import SMOOTH_ROWS, Model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import hdsim.kernel as k
 from hdsim.effects import catalogue
 from hdsim.effects.__main__ import page
 from hdsim.effects._fitting import range_of, scales_of
@@ -31,46 +28,20 @@ from hdsim.effects.torsional_hysteresis_maxwell import SlipElement, TorsionalHys
 from hdsim.effects.unbalance import Unbalance
 from hdsim.effects.wave_generator_bearing import BearingComponent, WaveGeneratorBearing
 from hdsim.parts import Effect
-
-COORDINATES = {
-    "time",
-    "wave_generator_angle",
-    "output_angle",
-    "velocity",
-    "direction",
-    "time_since_reversal",
-    "torque",
-    "temperature",
-    "frequency",
-}
-CHANNELS = {
-    "motor_angle",
-    "motor_velocity",
-    "motor_torque",
-    "output_angle",
-    "output_velocity",
-    "output_torque",
-    "load_torque",
-    "temperature",
-}
-#: Size of each input in operation, and its smallest interesting size: random magnitudes lie in between.
-SIZES = {
-    k.MOTOR_ANGLE: (0.1, 300.0),
-    k.MOTOR_VELOCITY: (1e-3, 400.0),
-    k.RING_ANGLE: (0.01, 3.0),
-    k.RING_VELOCITY: (1e-5, 4.0),
-    k.OUTPUT_ANGLE: (0.01, 3.0),
-    k.OUTPUT_VELOCITY: (1e-5, 4.0),
-    k.TRANSMITTED_TORQUE: (0.01, 100.0),
-    k.TWIST: (1e-6, 3e-3),
-    k.TWIST_RATE: (1e-6, 1.0),
-    k.MESH_TWIST: (1e-6, 3e-3),
-    k.MESH_TWIST_RATE: (1e-6, 1.0),
-    k.TIME: (0.1, 100.0),
-}
-#: Angle or twist column of each port, by the row of its torque.
-PORTS = {row: 2 * row for row in (k.MOTOR_TORQUE, k.RING_TORQUE, k.OUTPUT_TORQUE)}
-PORTS |= {k.TWIST_TORQUE: k.TWIST, k.MESH_TORQUE: k.MESH_TWIST}
+from hdsim.testing.alone import Alone
+from hdsim.testing.effect import (
+    BASE,
+    SIZES,
+    check_class,
+    check_compliances,
+    check_files,
+    check_heat,
+    check_jacobian,
+    check_power,
+    check_signatures,
+    check_twist,
+    placed,
+)
 
 #: Every effect with its default numbers, and settings that reach what the defaults leave unused.
 EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in catalogue().items()} | {
@@ -127,12 +98,12 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
     "load_dependent_loss, by direction": (LoadDependentLoss(coefficient=0.2, back_driving_coefficient=0.05),),
     "unbalance, both": (Unbalance(motor_kg_m=1e-4, motor_phase_deg=20, output_phase_deg=-50),),
 }
-MODELS: dict[str, Model] = {}
+MODELS: dict[str, Alone] = {}
 
 
-def model(name: str) -> Model:
+def model(name: str) -> Alone:
     if name not in MODELS:
-        MODELS[name] = Model(*EFFECTS[name], base=2e-3)
+        MODELS[name] = Alone(*EFFECTS[name], base=BASE)
     return MODELS[name]
 
 
@@ -149,45 +120,12 @@ def random_inputs(draw: st.DrawFn) -> tuple[list[float], list[float]]:
     return values, own
 
 
-def placed(model: Model, drawn: tuple[list[float], list[float]]) -> np.ndarray:
-    inputs = model.initial
-    inputs[: k.OWN] = drawn[0]
-    scales = np.array([state.scale for state in model.builder.states])
-    inputs[k.OWN :] += scales * np.array(drawn[1][: len(scales)])
-    return inputs
-
-
-def differences(model: Model, inputs: np.ndarray) -> np.ndarray:
-    """d outputs / d inputs by fourth-order central differences, shape (columns, columns)."""
-    columns = []
-    for column in range(model.columns):
-        lowest = SIZES[column][0] if column in SIZES else model.builder.states[column - k.OWN].scale
-        step = 2e-4 * max(lowest, abs(inputs[column]))
-        if column in (k.MOTOR_ANGLE, k.OUTPUT_ANGLE, k.RING_ANGLE):
-            step = 1e-5
-        total = np.zeros(model.columns)
-        for weight, shift in ((8, 1), (-8, -1), (-1, 2), (1, -2)):
-            moved = inputs.copy()
-            moved[column] += shift * step
-            total += weight * model(moved)[0]
-        columns.append(total / (12 * step))
-    return np.array(columns).T
-
-
 # A table's second derivative jumps at its corners, which a difference quotient may straddle.
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "table"])
 @settings(max_examples=60, deadline=None)
 @given(drawn=random_inputs())
 def test_jacobian_equals_finite_differences(name: str, drawn: tuple[list[float], list[float]]) -> None:
-    m = model(name)
-    inputs = placed(m, drawn)
-    outputs, exact = m(inputs)
-    numeric = differences(m, inputs)
-    for row in [*SMOOTH_ROWS, *range(k.OWN, m.columns)]:
-        # A derivative counts as far as it moves the output when its input changes by its own size.
-        sizes = np.abs(inputs) + 1e-12
-        scale = np.max(np.abs(numeric[row]) * sizes) + abs(outputs[row])
-        assert np.abs((exact[row] - numeric[row]) * sizes).max() <= 1e-6 * scale + 1e-13, f"row {row}"
+    check_jacobian(model(name), placed(model(name), *drawn), name)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -196,64 +134,29 @@ def test_jacobian_equals_finite_differences(name: str, drawn: tuple[list[float],
 def test_power_in_equals_heat_and_stored_and_exchanged_power(
     name: str, drawn: tuple[list[float], list[float]]
 ) -> None:
-    m = model(name)
-    inputs = placed(m, drawn)
-    outputs, _ = m(inputs)
-    stored = differences(m, inputs)[k.STORED]
-    rates = np.zeros(m.columns)
-    rates[list(PORTS.values())] = inputs[[c + 1 for c in PORTS.values()]]
-    rates[k.TIME] = 1.0
-    rates[k.OWN :] = outputs[k.OWN :]
-    taken = sum(outputs[row] * inputs[column + 1] for row, column in PORTS.items())
-    balance = [
-        taken,
-        outputs[k.DISSIPATED],
-        stored @ rates,
-        -outputs[k.SUPPLIED],
-        outputs[k.DELIVERED],
-    ]
-    size = np.abs(balance).max() + np.abs(stored * rates).max()
-    assert abs(sum(balance)) <= 1e-7 * size + 1e-14
-    # Stored energy is a function of positions and own states only: its rate could not be balanced otherwise.
-    others = [k.MOTOR_VELOCITY, k.RING_VELOCITY, k.OUTPUT_VELOCITY, k.TRANSMITTED_TORQUE]
-    others += [k.TWIST_RATE, k.MESH_TWIST_RATE]
-    assert not stored[others].any()
+    check_power(model(name), placed(model(name), *drawn), name)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 @settings(max_examples=60, deadline=None)
 @given(drawn=random_inputs())
 def test_heat_is_never_negative(name: str, drawn: tuple[list[float], list[float]]) -> None:
-    m = model(name)
-    inputs = placed(m, drawn)
-    heat = m(inputs)[0][k.DISSIPATED]
-    assert heat >= 0
-    if not m.builder.last:  # a thermal effect lowers the base friction's heat, every other effect adds to it
-        assert heat >= 2e-3 * inputs[k.MOTOR_VELOCITY] ** 2 * (1 - 1e-12)
+    check_heat(model(name), placed(model(name), *drawn), name)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 @settings(max_examples=60, deadline=None)
 @given(motor=st.floats(-300, 300), output=st.floats(-3, 3))
 def test_twist_derivatives_equal_finite_differences(name: str, motor: float, output: float) -> None:
-    m = model(name)
-    step = 1e-4
-    value = m.error(motor, output)
-    by_motor = (m.error(motor + step, output) - m.error(motor - step, output)) / (2 * step)
-    by_output = (m.error(motor, output + step) - m.error(motor, output - step)) / (2 * step)
-    numeric = np.array([by_motor[0], by_output[0], by_motor[1], by_motor[2], by_output[2]])
-    assert np.allclose(numeric, value[1:], rtol=1e-5, atol=1e-8)
-    assert by_output[1] == pytest.approx(value[4], rel=1e-5, abs=1e-8)
+    check_twist(model(name), motor, output, name)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_series_compliances_are_odd_and_rise(name: str) -> None:
-    torque = np.linspace(-300, 300, 601)
-    for wind_up in model(name).builder.compliances:
-        angle = wind_up(torque)
-        assert angle.shape == torque.shape
-        assert np.all(np.diff(angle) > 0)
-        assert np.allclose(angle, -angle[::-1], atol=1e-18)
+def test_kernels_compliances_and_files_are_as_they_should_be(name: str) -> None:
+    check_signatures(model(name).builder, name)
+    check_compliances(model(name), name)
+    for effect in EFFECTS[name]:
+        check_files(effect, name)
 
 
 @pytest.mark.parametrize("name", catalogue())
@@ -264,18 +167,10 @@ def test_effect_does_something_or_says_what_it_needs(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "kind"), catalogue().items())
-def test_catalogue_entry_is_complete(name: str, kind: type) -> None:
-    s = kind.signature
-    assert kind.title
-    assert kind.source
+def test_catalogue_entry_is_complete(name: str, kind: type[Effect]) -> None:
+    check_class(kind, name)
     assert kind.__module__.endswith("." + name)
-    assert s.lives_in
-    assert set(s.lives_in) <= COORDINATES
-    assert s.channels
-    assert set(s.channels) <= CHANNELS
-    assert set(s.confused_with) <= set(catalogue()) - {name}
-    properties = kind.model_json_schema()["properties"]
-    assert all(field.get("description") for field in properties.values())
+    assert set(kind.signature.confused_with) <= set(catalogue()) - {name}
 
 
 FITTED = [

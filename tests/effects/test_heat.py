@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from annotated_types import Ge, Gt, Le, Lt
-from harness import Model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from test_every_effect import SIZES
 
 import hdsim.drive.model as drive_model
 import hdsim.kernel as k
@@ -31,6 +29,8 @@ from hdsim.log import verify_log
 from hdsim.parts import Builder, Parameters, Part
 from hdsim.simulation.run import Run
 from hdsim.simulation.simulate import summary
+from hdsim.testing.alone import Alone
+from hdsim.testing.effect import SIZES
 
 #: Size up to which a number without an upper bound is drawn, and down to which all are.
 LARGEST, SMALLEST = 1e6, 1e-9
@@ -86,7 +86,7 @@ class DriveFriction(Part):
         contribute_friction(build, self.friction)
 
 
-def states_of(rng: np.random.Generator, model: Model) -> np.ndarray:
+def states_of(rng: np.random.Generator, model: Alone) -> np.ndarray:
     """Inputs in operation, own states within their scales."""
     inputs = model.initial
     for column, (low, high) in SIZES.items():
@@ -103,7 +103,7 @@ def states_of(rng: np.random.Generator, model: Model) -> np.ndarray:
 def test_no_legal_numbers_let_an_effect_give_energy_back(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     effect, own = anything(catalogue()[name], rng), anything(Friction, rng)
-    model = Model(DriveFriction(friction=own), InputCoulombViscous(coulomb_nm=0.02), effect)
+    model = Alone(DriveFriction(friction=own), InputCoulombViscous(coulomb_nm=0.02), effect)
     inputs = states_of(rng, model)
     heats = model.heats(inputs)
     # What cancels in a sum of heats leaves its rounding.
@@ -120,7 +120,7 @@ def test_no_legal_combination_of_effects_gives_energy_back(block: int) -> None:
     for _ in range(100):
         names = rng.choice(COMBINED, int(rng.integers(2, 7)), replace=False)
         effects = {str(name): anything(catalogue()[str(name)], rng) for name in names}
-        model = Model(DriveFriction(friction=anything(Friction, rng)), *effects.values())
+        model = Alone(DriveFriction(friction=anything(Friction, rng)), *effects.values())
         for _ in range(5):
             inputs = states_of(rng, model)
             heats = model.heats(inputs)
@@ -131,7 +131,7 @@ def test_thermal_friction_changes_as_much_as_the_shaft_has_however_much_is_asked
     # The numbers with which a free motor ran away.
     asked = ThermalFriction(viscous_nm_s_per_rad=8e-4, coulomb_nm=5.0, ambient_degc=60)
     own = Friction(coulomb_nm=0.03, viscous_nm_s_per_rad=3.5e-4, load_coefficient=0.0)
-    model = Model(DriveFriction(friction=own), asked)
+    model = Alone(DriveFriction(friction=own), asked)
     inputs = model.initial
     inputs[k.MOTOR_VELOCITY] = 200.0
     expected = 3.5e-4 * np.exp(-0.033 * 40) * 200.0 + 0.03 * np.exp(-0.01 * 40)

@@ -6,18 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from harness import FakeBuilder
 from pydantic import ValidationError
 
 from hdsim.effects.sensors import Encoder, EncoderRipple, SensorRipple, Sensors, TorqueSensor, VelocitySensor
 from hdsim.errors import InputError
+from hdsim.testing.alone import Collector
 
 TIMES = np.linspace(0.0, 2.0, 20001)
 RAMP = 30.0 * TIMES
 
 
 def test_contribute_registers_only_the_named_channels() -> None:
-    build = FakeBuilder()
+    build = Collector()
     Sensors(motor_angle=Encoder(), output_torque=TorqueSensor()).contribute(build)
     assert set(build.sensors) == {"motor_angle", "output_torque"}
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from harness import Model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -14,7 +13,7 @@ from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
 import hdsim.kernel as k
-from hdsim.drive.model import Model as DriveModel
+from hdsim.drive.model import Model
 from hdsim.drive.parameters import Drive
 from hdsim.effects.input_coulomb_viscous import InputCoulombViscous
 from hdsim.effects.kinematic_error import ErrorComponent, KinematicError
@@ -23,6 +22,7 @@ from hdsim.effects.table import Table, TableCurve
 from hdsim.effects.unbalance import Unbalance
 from hdsim.parts import Effect
 from hdsim.simulation.run import Run
+from hdsim.testing.alone import Alone
 
 
 def table(coordinate: str, acts_on: str, at, values, **more) -> Table:
@@ -34,7 +34,7 @@ def table(coordinate: str, acts_on: str, at, values, **more) -> Table:
 def swing(effect: Effect | None, mesh: str = "lumped", seconds: float = 0.6) -> tuple[Run, object]:
     """A lossy drive with an arm's inertia, thrown by its initial speed and a step of load."""
     drive = Drive.model_validate({"preset": "seed-2021", "mesh": {"model": mesh}})
-    model = DriveModel(drive, [] if effect is None else [effect], load_inertia_kg_m2=0.3)
+    model = Model(drive, [] if effect is None else [effect], load_inertia_kg_m2=0.3)
     run = Run(
         model, duration_s=seconds, sample_rate_hz=500, rtol=1e-9, y0=model.initial_state(motor_velocity=80.0)
     )
@@ -113,7 +113,7 @@ def test_the_energy_account_closes_for_every_kind_of_curve(curve: Table, mesh: s
 
 
 def test_stored_energy_is_the_integral_of_the_torque_over_many_turns() -> None:
-    model = Model(table("motor_angle", "motor_torque", [0.2, 1.0, 2.5], [0.3, -0.2, 0.5], period=4.0))
+    model = Alone(table("motor_angle", "motor_torque", [0.2, 1.0, 2.5], [0.3, -0.2, 0.5], period=4.0))
 
     def outputs(angle: float) -> np.ndarray:
         inputs = model.initial
@@ -145,7 +145,7 @@ def test_the_curve_meets_its_corners_is_smooth_and_levels_off(
     values = [value for _, value in steps]
     periodic = periodic and len(at) > 2
     more = {"period": float(at[-1] - at[0] + 1.0)} if periodic else {}
-    model = Model(table("output_angle", "output_torque", at, values, **more))
+    model = Alone(table("output_angle", "output_torque", at, values, **more))
 
     def torque(angle: float) -> float:
         inputs = model.initial
@@ -170,7 +170,7 @@ def test_the_curve_meets_its_corners_is_smooth_and_levels_off(
 
 def test_between_close_corners_the_curve_is_that_of_a_spline() -> None:
     at = np.linspace(-2, 2, 81)
-    model = Model(table("output_angle", "output_torque", at, np.sin(3 * at)))
+    model = Alone(table("output_angle", "output_torque", at, np.sin(3 * at)))
     inputs = model.initial
     spline = CubicSpline(at, np.sin(3 * at))
     for angle in np.linspace(-1.9, 1.9, 57):
@@ -179,7 +179,7 @@ def test_between_close_corners_the_curve_is_that_of_a_spline() -> None:
 
 
 def test_a_torque_that_brakes_is_heat_and_one_that_drives_is_supplied() -> None:
-    model = Model(table("motor_velocity", "motor_torque", [-10, 0, 10], [-0.1, 0.0, -0.1]))
+    model = Alone(table("motor_velocity", "motor_torque", [-10, 0, 10], [-0.1, 0.0, -0.1]))
     inputs = model.initial
     for speed, heat, supplied in ((10.0, 1.0, 0.0), (-10.0, 0.0, 1.0)):
         inputs[k.MOTOR_VELOCITY] = speed

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from comparing import assert_same_bits
 
 from hdsim.errors import InputError
+from hdsim.export.commands import export
 from hdsim.log import commands, export_log, open_log, write_log
 
 
@@ -31,7 +32,7 @@ def test_info_lists_topics_columns_units_and_metadata(log):
 
 
 def test_csv_brings_back_every_bit(log, recording, tmp_path):
-    done = invoke(commands.export, log, tmp_path / "out" / "state.csv")
+    done = invoke(export, log, tmp_path / "out" / "state.csv")
     assert done.output.strip().endswith("state.csv")
     with open(tmp_path / "out" / "state.csv", newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)

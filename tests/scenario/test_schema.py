@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
-from hdsim.scenario import Scenario, json_schema
+from hdsim.scenario import Scenario, ScenarioError, json_schema
+from hdsim.scenario.commands import check, described
 from hdsim.scenario.fields import split_unit
 from hdsim.scenario.reader import flatten, read_node
 
@@ -32,6 +34,36 @@ def test_shipped_scenarios_satisfy_the_schema_and_the_reader(path: Path, validat
     data = flatten(read_node(path)).data
     assert [error.message for error in validator.iter_errors(data)] == []
     assert Scenario.from_yaml(path).name == data.get("name", path.stem)
+
+
+@pytest.mark.parametrize("kind", ["mapping", "study", "loadcycle"])
+def test_shipped_files_satisfy_their_schema_and_the_check(kind: str) -> None:
+    (stored,) = SCENARIOS[0].parent.rglob(f"{kind}.schema.json")
+    validator = jsonschema.Draft202012Validator(json_schema(described(kind)))
+    paths = sorted(stored.parent.glob("*.yaml"))
+    assert paths
+    for path in paths:
+        data = flatten(read_node(path)).data
+        assert [(path.name, error.message) for error in validator.iter_errors(data)] == []
+        assert not validator.is_valid(data | {"laod": 1})
+        assert not validator.is_valid(data | {"name": 3, "description": 3})
+    done = CliRunner().invoke(check, [str(path) for path in paths])
+    assert done.exit_code == 0, done.output
+    assert done.output.count(": OK\n") == len(paths)
+
+
+def test_the_check_knows_mappings_and_studies_by_their_keys(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(
+        "time: {rate_hz: 1000}\nchannels: {output_angle: {column: a, unit: degrees}}\n"
+    )
+    (tmp_path / "s.yaml").write_text(
+        "base: {procedure: transmission_eror, drive: {preset: seed-2021}}\nmetrics: [x]\n"
+    )
+    done = CliRunner().invoke(check, [str(tmp_path / "m.yaml"), str(tmp_path / "s.yaml")])
+    assert isinstance(done.exception, ScenarioError)
+    text = str(done.exception)
+    assert "m.yaml:2: channels.output_angle.unit: found 'degrees'" in text
+    assert "s.yaml:1: base.procedure" in text
 
 
 def test_the_schema_refuses_what_the_reader_refuses(validator: Any) -> None:

@@ -19,7 +19,7 @@ from hdsim.tell.report import write_report
 
 #: A record's name that must not end as HTML.
 NASTY = "<script>alert('x')</script> & co"
-GAP = Gap(before=0.02, refit=0.015, after=0.0021, noise=0.002, unit="N m", variation=0.1)
+GAP = Gap(before=0.02, refit=0.015, after=0.0021, noise=0.002, unit="N m", variation=0.1, regression=0.0032)
 
 
 def place(coordinate: str = "output_angle", share: float = 0.8) -> PlaceEvidence:

@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import HdsimError, InputError
+from hdsim.simulation.ensemble import InProcess
 from hdsim.studies.engine.causes import Cause, causes
-from hdsim.studies.engine.execute import InProcess
 from hdsim.studies.engine.shapley import (
     MOST_EXACT,
     Coalition,
@@ -254,6 +254,8 @@ def _run(text: str, on: Coalition) -> tuple[Recording, Scenario]:
     """
     from hdsim.drive import _layout
     from hdsim.scenario.model import Scenario
+    from hdsim.simulation.ensemble import record_at_once
+    from hdsim.simulation.run import RunFailed
     from hdsim.simulation.setup import build_run
 
     whole = Scenario.model_validate(json.loads(text))
@@ -277,9 +279,7 @@ def _run(text: str, on: Coalition) -> tuple[Recording, Scenario]:
         numbers = model.system.reals[int(model.system.integers[_layout.MESH_AT]) :]
         for name in in_teeth:
             (model.teeth.close_gaps if name == "backlash" else model.teeth.remove_pitch_errors)(numbers)
-    recording = run.record()
-    if run.interrupted is not None:
-        raise run.interrupted
-    if run.failure:
-        raise HdsimError(f"{_with(on)}, the run stopped early: {run.failure}")
-    return recording, scenario
+    try:
+        return record_at_once(run), scenario
+    except RunFailed as error:
+        raise HdsimError(f"{_with(on)}, the run stopped early: {error}") from error

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from hdsim.actuation.loads import Load
+
 if TYPE_CHECKING:
     from hdsim.scenario.model import Scenario
 
@@ -41,9 +43,13 @@ class Cause:
     change: Callable[[dict[str, Any]], object] | None = None
 
 
+def _inertia(data: dict[str, Any]) -> float:
+    """Moment of inertia on the output, that of an arm as it begins included, kg m^2."""
+    return Load.model_validate(data["load"]).over(0.0)[1]
+
+
 def _no_load(data: dict[str, Any]) -> None:
-    data["load"]["torque"] = None
-    data["load"]["gravity"] = None
+    data["load"] |= {"inertia_kg_m2": _inertia(data), "torque": None, "gravity": None, "arm": None}
 
 
 def _no_friction(data: dict[str, Any]) -> None:
@@ -53,7 +59,7 @@ def _no_friction(data: dict[str, Any]) -> None:
         data["command"]["motor"] = {"type": "motion", "trajectory": motor["trajectory"], "at": motor["at"]}
         # The controller also damped the load's vibration. Damping changes nothing at rest.
         torsion = data["drive"]["torsion"]
-        critical = 2.0 * math.sqrt(torsion["stiffness_k3_nm_per_rad"] * data["load"]["inertia_kg_m2"])
+        critical = 2.0 * math.sqrt(torsion["stiffness_k3_nm_per_rad"] * _inertia(data))
         torsion["damping_nm_s_per_rad"] = max(torsion["damping_nm_s_per_rad"], _DAMPING * critical)
     else:
         for name in _DRIVE_FRICTION:
@@ -84,8 +90,8 @@ def causes(scenario: Scenario) -> tuple[Cause, ...]:
         found.append(
             Cause("kinematic_error", "kinematic error", " and ".join(names) + " off", group(_KINEMATIC))
         )
-    if scenario.load.torque is not None or scenario.load.gravity is not None:
-        found.append(Cause("wind_up", "wind-up under load", "load torque and gravity off", (), _no_load))
+    if any(part is not None for part in (scenario.load.torque, scenario.load.gravity, scenario.load.arm)):
+        found.append(Cause("wind_up", "wind-up under load", "load torque and weight off", (), _no_load))
     if group(_HYSTERESIS):
         found.append(Cause("hysteresis", "hysteresis", "torsional hysteresis off", group(_HYSTERESIS)))
     motor = scenario.command.motor.type

@@ -12,10 +12,16 @@ from hdsim.parts import Parameters
 Value = bool | int | float | str | None
 
 
+def _or_text(schema: dict[str, Any]) -> None:
+    """For editors: the file may have one text here, which the reader makes into what is wanted."""
+    own = {key: schema.pop(key) for key in ("type", "items", "minItems", "anyOf") if key in schema}
+    schema["anyOf"] = [*own.pop("anyOf", [own]), {"type": "string"}]
+
+
 class Base(Parameters):
     """What every run starts from: a scenario, or a bench procedure applied to a drive."""
 
-    scenario: dict[str, Any] | None = None
+    scenario: dict[str, Any] | None = Field(None, json_schema_extra=_or_text)
     """A scenario: the path of its file, or written here (it may extend a file)."""
     procedure: str | None = None
     """Name of a bench procedure; given instead of a scenario."""
@@ -242,7 +248,7 @@ class Study(Parameters):
     sampled at random."""
     seed: int = Field(0, ge=0, lt=2**63)
     """Seed of the samples and of the drives after the base's own."""
-    metrics: list[str] = Field(min_length=1)
+    metrics: list[str] = Field(min_length=1, json_schema_extra=_or_text)
     """Names of the metrics that are taken of every run."""
     keep_logs: bool = False
     """Keep the MCAP log of every run."""

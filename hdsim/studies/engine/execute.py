@@ -7,32 +7,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor
 from contextlib import contextmanager
-from typing import Any, TypeVar
 
 from hdsim.errors import HdsimError, InputError
+from hdsim.simulation.ensemble import InProcess, as_completed
 from hdsim.studies.engine.worker import Batch, Job, Recipe, Row, run_batch, warm_start
-
-T = TypeVar("T")
 
 #: Most runs in one task: enough to hide the cost of sending it, few enough to lose little by a kill.
 LARGEST_BATCH = 50
 #: One thread a process: the matrices are small, and the processes already fill the machine.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-
-
-class InProcess(Executor):
-    """Runs every task at once where it is submitted."""
-
-    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Call ``fn`` and return its finished future."""
-        future: Future[T] = Future()
-        try:
-            future.set_result(fn(*args, **kwargs))
-        except Exception as error:
-            future.set_exception(error)
-        return future
 
 
 @contextmanager
@@ -120,30 +105,11 @@ def execute(
     """
     from concurrent.futures.process import BrokenProcessPool
 
-    left = iter(waiting)
-    window = width if isinstance(pool, InProcess) else 2 * width
-    running: set[Future[list[Row]]] = set()
     try:
-        while True:
-            for batch in left:
-                running.add(pool.submit(run_batch, batch))
-                if len(running) >= window:
-                    break
-            if not running:
-                return
-            done, running = _first(running)
-            for future in done:
-                on_rows(future.result())
+        for _, rows in as_completed(run_batch, waiting, pool, width):
+            on_rows(rows)
     except BrokenProcessPool as error:
         raise HdsimError(
             "a worker process died (out of memory, or killed); what was done is kept, start the study again "
             "to go on, with fewer --workers if memory was short"
         ) from error
-    finally:
-        for future in running:
-            future.cancel()
-
-
-def _first(running: set[Future[list[Row]]]) -> tuple[set[Future[list[Row]]], set[Future[list[Row]]]]:
-    done, rest = wait(running, return_when=FIRST_COMPLETED)
-    return set(done), set(rest)

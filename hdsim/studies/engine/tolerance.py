@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from hdsim.errors import InputError
 from hdsim.scenario.problems import Mark
 from hdsim.scenario.reader import Source
+from hdsim.simulation.ensemble import InProcess
 from hdsim.studies.engine.definition import Base, Study, ValueList
 from hdsim.studies.engine.design import drive_seed
-from hdsim.studies.engine.execute import InProcess, batches, execute
+from hdsim.studies.engine.execute import batches, execute
 from hdsim.studies.engine.worker import Batch, Job, Row, run_batch
 
 if TYPE_CHECKING:

@@ -201,14 +201,16 @@ def record(scenario: Scenario, log: Path | None = None) -> tuple[Recording, str]
         log.parent.mkdir(parents=True, exist_ok=True)
         done = simulate_to_log(scenario, log)
         return open_log(log), done.failure or ""
+    from hdsim.recording import Recording
+    from hdsim.simulation.ensemble import record_at_once
+    from hdsim.simulation.run import RunFailed
     from hdsim.simulation.setup import build_run
 
     # Without the provenance that ``simulate`` collects: the study keeps it once for all its runs.
-    run = build_run(scenario)
-    recording = run.record()
-    if run.interrupted is not None:
-        raise run.interrupted
-    return recording, run.failure or ""
+    try:
+        return record_at_once(build_run(scenario)), ""
+    except RunFailed as error:
+        return error.recording or Recording({}), str(error)
 
 
 def measured(names: Sequence[str], recording: Recording, scenario: Scenario) -> tuple[dict[str, float], str]:
@@ -247,4 +249,4 @@ def warm_start() -> None:
             os._exit(1)
 
         threading.Thread(target=follow, daemon=True).start()
-    importlib.import_module("hdsim.simulation.setup")
+    importlib.import_module("hdsim.simulation.ensemble")

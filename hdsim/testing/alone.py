@@ -1,4 +1,4 @@
-"""A drive-less model: collects what effects contribute and calls their kernels as the assembly does."""
+"""Effects without a drive: what they contribute, and their kernels called as the assembly calls them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-from hdsim._abi import call_element, call_twist
 from hdsim.kernel import (
     DISSIPATED,
     INPUT_FRICTION,
@@ -24,6 +23,9 @@ from hdsim.kernel import (
     element,
 )
 from hdsim.parts import INPUT_FRICTION_HEAT, InputFriction, Part, State
+from hdsim.testing import _calls
+
+Array = NDArray[np.float64]
 
 #: Rows of the outputs whose derivatives the contract asks for, own rates aside.
 SMOOTH_ROWS = [row for row in range(OWN) if row < STORED]
@@ -41,20 +43,8 @@ def base_friction(inputs: Any, parameters: Any, own: int, columns: int, outputs:
     jacobian[DISSIPATED * columns + MOTOR_VELOCITY] += 2.0 * parameters[0] * speed
 
 
-@njit(cache=True)
-def _elements(addresses, offsets, owns, numbers, columns, inputs, outputs, jacobian):
-    for i in range(len(addresses)):
-        call_element(addresses[i], inputs, numbers[offsets[i] :], owns[i], columns, outputs, jacobian)
-
-
-@njit(cache=True)
-def _twists(addresses, offsets, numbers, motor_angle, output_angle, error):
-    for i in range(len(addresses)):
-        call_twist(addresses[i], motor_angle, output_angle, numbers[offsets[i] :], error)
-
-
-class FakeBuilder:
-    """Implements ``hdsim.parts.Builder`` as a list."""
+class Collector:
+    """``hdsim.parts.Builder`` as lists of what was handed in."""
 
     def __init__(
         self,
@@ -89,6 +79,7 @@ class FakeBuilder:
         last: bool = False,
         heat: str = "",
     ) -> int:
+        """See ``hdsim.parts.Builder.element``."""
         own = OWN + len(self.states)
         self.states += states
         (self.last if last else self.first).append((kernel, [float(p) for p in parameters], own))
@@ -96,42 +87,57 @@ class FakeBuilder:
         return own
 
     def declare_input_friction(self, friction: InputFriction) -> None:
+        """See ``hdsim.parts.Builder.declare_input_friction``."""
         self.declared.append(friction)
 
     def housing(self, own: int, inertia_kg_m2: float) -> None:
+        """See ``hdsim.parts.Builder.housing``."""
         self.moving_housing = (own, inertia_kg_m2)
 
     def external(self, name: str) -> int | None:
+        """See ``hdsim.parts.Builder.external``."""
         return self.given.get(name)
 
     def twist(self, kernel: Kernel, parameters: Any) -> None:
+        """See ``hdsim.parts.Builder.twist``."""
         self.twists.append((kernel, [float(p) for p in parameters]))
 
     def series_compliance(self, wind_up: Callable[[Any], Any], *, play: bool = False) -> None:
+        """See ``hdsim.parts.Builder.series_compliance``."""
         self.compliances.append(wind_up)
 
     def widen_gap(self, half_gap_rad: float) -> None:
+        """See ``hdsim.parts.Builder.widen_gap``."""
         self.half_gap += half_gap_rad
 
     def signal(self, signal: Any) -> int:
+        """See ``hdsim.parts.Builder.signal``."""
         raise NotImplementedError
 
     def state_index(self, name: str) -> int | None:
+        """See ``hdsim.parts.Builder.state_index``."""
         return next((OWN + i for i, state in enumerate(self.states) if state.name == name), None)
 
     def sensor(self, channel: str, sensor: Any) -> None:
+        """See ``hdsim.parts.Builder.sensor``."""
         self.sensors[channel] = sensor
 
 
-class Model:
-    """The kernels of some effects, callable."""
+class Alone:
+    """The kernels of some effects, callable.
+
+    Args:
+        effects: the effects, or other parts.
+        base: viscous friction that the drive has on its own, N m s/rad.
+        options: of ``Collector``.
+    """
 
     def __init__(self, *effects: Part, base: float = 0.0, **options: Any) -> None:
         # As in the assembly, friction of all parts is known after a first pass.
-        before = FakeBuilder(viscous=base, **options)
+        before = Collector(viscous=base, **options)
         for effect in effects:
             effect.contribute(before)
-        self.builder = build = FakeBuilder(viscous=base, **options)
+        self.builder = build = Collector(viscous=base, **options)
         build.input_frictions = before.declared
         build.element(base_friction, [base], heat=INPUT_FRICTION_HEAT)
         for effect in effects:
@@ -150,28 +156,28 @@ class Model:
         return addresses, offsets, np.array([x for _, numbers in parts for x in numbers], dtype=float)
 
     @property
-    def initial(self) -> np.ndarray:
+    def initial(self) -> Array:
         """Inputs at rest, own states at their initial values."""
         inputs = np.zeros(self.columns)
         inputs[OWN:] = [state.initial for state in self.builder.states]
         return inputs
 
-    def __call__(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(self, inputs: Array) -> tuple[Array, Array]:
         """Outputs (columns,) and Jacobian (columns, columns)."""
         outputs, jacobian = np.zeros(self.columns), np.zeros((self.columns, self.columns))
         addresses, offsets, numbers = self._elements
         flat = jacobian.reshape(-1)
-        _elements(addresses, offsets, self._owns, numbers, self.columns, inputs, outputs, flat)
+        _calls.elements(addresses, offsets, self._owns, numbers, self.columns, inputs, outputs, flat)
         return outputs, jacobian
 
-    def heats(self, inputs: np.ndarray) -> dict[str, float]:
+    def heats(self, inputs: Array) -> dict[str, float]:
         """Heat of every account, W."""
         found: dict[str, float] = {}
         addresses, offsets, numbers = self._elements
         for k, account in enumerate(self.builder.first_heat + self.builder.last_heat):
             outputs, jacobian = np.zeros(self.columns), np.zeros(self.columns**2)
             one = slice(k, k + 1)
-            _elements(
+            _calls.elements(
                 addresses[one],
                 offsets[one],
                 self._owns[one],
@@ -184,32 +190,32 @@ class Model:
             found[account] = found.get(account, 0.0) + float(outputs[DISSIPATED])
         return found
 
-    def powers(self, inputs: np.ndarray) -> float:
+    def powers(self, inputs: Array) -> float:
         """Sum of the sizes of all powers and heats of the elements, W."""
         total = 0.0
         addresses, offsets, numbers = self._elements
         for k in range(len(addresses)):
             outputs, jacobian = np.zeros(self.columns), np.zeros(self.columns**2)
             which = addresses[k : k + 1], offsets[k : k + 1], self._owns[k : k + 1]
-            _elements(*which, numbers, self.columns, inputs, outputs, jacobian)
+            _calls.elements(*which, numbers, self.columns, inputs, outputs, jacobian)
             speeds = [inputs[c] for c in (MOTOR_VELOCITY, OUTPUT_VELOCITY, TWIST_RATE)]
             torques = [outputs[r] for r in (MOTOR_TORQUE, OUTPUT_TORQUE, TWIST_TORQUE)]
             total += abs(outputs[DISSIPATED]) + sum(abs(t * w) for t, w in zip(torques, speeds, strict=True))
         return total
 
-    def error(self, motor_angle: float, output_angle: float) -> np.ndarray:
+    def error(self, motor_angle: float, output_angle: float) -> Array:
         """e, de/dm, de/do, d2e/dm2, d2e/dm do, d2e/do2."""
         result = np.zeros(6)
         addresses, offsets, numbers = self._twists
         if len(addresses):
-            _twists(addresses, offsets, numbers, motor_angle, output_angle, result)
+            _calls.twists(addresses, offsets, numbers, motor_angle, output_angle, result)
         return result
 
-    def follow(self, column: int, position: Any, speed: Any, times: np.ndarray, rtol: float = 1e-9) -> Any:
+    def follow(self, column: int, position: Any, speed: Any, times: Array, rtol: float = 1e-9) -> Any:
         """Own states, shape (states, n), while an angle column and its speed follow prescribed functions."""
         from scipy.integrate import solve_ivp
 
-        def rate(t: float, own: np.ndarray) -> np.ndarray:
+        def rate(t: float, own: Array) -> Array:
             inputs = self.initial
             inputs[column], inputs[column + 1], inputs[OWN:] = position(t), speed(t), own
             return self(inputs)[0][OWN:]

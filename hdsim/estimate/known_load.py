@@ -1,0 +1,75 @@
+"""The load of a prediction as parts: what is measured of it, and what the scenario says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hdsim.errors import InputError
+from hdsim.estimate.spline import smoothed
+
+if TYPE_CHECKING:
+    from hdsim.actuation.arm import Arm, Course
+    from hdsim.actuation.signal_data import SignalData
+    from hdsim.estimate.records import Array, Record
+    from hdsim.parts import Builder
+
+
+class MeasuredTorque:
+    """A measured torque on the output."""
+
+    def __init__(self, torque: SignalData) -> None:
+        self.torque = torque
+
+    def contribute(self, build: Builder) -> None:
+        """Add the torque to the output."""
+        from hdsim.actuation._kernels import load_torque
+
+        build.element(load_torque, [build.signal(self.torque)])
+
+
+class Gravity:
+    """A load without its torque over time."""
+
+    def __init__(self, load: Any) -> None:
+        self.load = load
+
+    def contribute(self, build: Builder) -> None:
+        """Add the weight."""
+        if self.load.gravity is not None:
+            self.load.gravity.contribute(build)
+
+
+def arm_course(record: Record, arm: Arm) -> Course:
+    """What the drive's joint carries of an arm along a record: the other joints move as they were measured.
+
+    Where a joint was not measured it moves as the arm's ``joints`` says.
+
+    Args:
+        record: the measured run, with the angles of other joints.
+        arm: the arm.
+
+    Raises:
+        InputError: a measured joint is not the arm's, or the motion of one is neither measured nor given.
+    """
+    from scipy.interpolate import PPoly
+
+    from hdsim.actuation.arm import STEP_S
+
+    lost = [name for name in arm.others if name not in record.joints and name not in arm.joints]
+    if lost:
+        raise InputError(
+            f"{record.name}: load.arm: {lost[0]} is neither measured (joints of the mapping) nor given a "
+            "motion (joints of the arm)"
+        )
+    count = max(round(record.duration_s / max(record.period_s, STEP_S)), 2)
+    times = np.linspace(record.time[0], record.time[-1], count)
+    motions: dict[str, Array] = {
+        name: motion.values(times + record.begins_s)[:3] for name, motion in arm.joints.items()
+    }
+    for name, values in record.joints.items():
+        breaks, coefficients = smoothed(record.time, values, motion=True)
+        angle = PPoly(coefficients[::-1], breaks)
+        motions[name] = np.array([angle(times), angle(times, 1), angle(times, 2)])
+    return arm.along(times, motions)

@@ -1,0 +1,40 @@
+"""What can be learnt of the held-out data at all, beside what the model leaves of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from hdsim.estimate.found import Gap
+from hdsim.tell.words import short, spoken, unit_of
+
+if TYPE_CHECKING:
+    from hdsim.diagnosis.verdict import Verdict
+
+
+def last_model(verdict: Verdict) -> str:
+    """What the model of ``after`` is called."""
+    if verdict.verdict == "effect":
+        return "the named physics"
+    return "the model with the curve" if verdict.curve is not None else "the fitted model"
+
+
+def baselines(gaps: Mapping[str, Gap], model: str = "the fitted model") -> list[str]:
+    """A sentence for each channel with a baseline.
+
+    Args:
+        gaps: by channel.
+        model: what the model of ``after`` is called.
+    """
+    said = []
+    for channel, gap in gaps.items():
+        if gap.regression is None:
+            continue
+        unit = unit_of(gap)
+        regression, after, noise = (short(unit.factor * v) for v in (gap.regression, gap.after, gap.noise))
+        box = "" if gap.black_box is None else f", a black box {short(unit.factor * gap.black_box)}"
+        said.append(
+            f"{spoken(channel)}: a plain regression leaves {regression} {unit.name}{box}, {model} {after}, "
+            f"noise {noise}"
+        )
+    return said

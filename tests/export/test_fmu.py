@@ -1,0 +1,130 @@
+"""The joint as an FMU: accepted by FMPy without complaint, and on the same way as in hdsim."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+
+from hdsim import cli
+from hdsim.errors import InputError
+from hdsim.export.fmu import export_fmu
+from hdsim.scenario import Scenario
+from hdsim.simulation.simulate import simulate
+
+STEP = 1e-3
+#: 20 rad/s^2 at the output until 2 rad/s: corners at 0.1 s and 0.2 s, on the grid of the communication.
+MOVE = {
+    "type": "trapezoid",
+    "distance_deg": math.degrees(0.4),
+    "maximum_velocity_deg_per_s": math.degrees(2.0),
+    "maximum_acceleration_deg_per_s2": math.degrees(20.0),
+}
+GAINS = {
+    "position_gain_per_s": 40,
+    "velocity_gain_nm_s_per_rad": 0.025,
+    "velocity_integral_gain_nm_per_rad": 0.5,
+}
+SERVO = {"type": "position", "at": "output", "trajectory": MOVE, "controller": {"type": "cascade", **GAINS}}
+SCENARIO = {
+    "name": "a joint",
+    "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
+    "effects": {"kinematic_error": {}, "torsional_hysteresis_maxwell": {}},
+    "command": {"motor": SERVO},
+    "load": {"inertia_kg_m2": 0.5},
+    "run": {"duration_s": 0.2, "sample_rate_hz": 1000},
+}
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    return Scenario.model_validate(SCENARIO)
+
+
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
+def test_an_importer_finds_the_trajectory_of_the_run(fmi: int, scenario: Scenario, tmp_path: Path) -> None:
+    out = export_fmu(scenario, tmp_path / f"joint {fmi}.fmu", fmi=fmi)
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+    assert validate_fmu(str(out)) == []
+    whole = simulate(scenario)
+    times = whole.time
+    wanted = scenario.command.motor.signal.data.values(times, times + 1e-9)  # type: ignore[union-attr]
+    names = ["time", "commanded_angle", "commanded_velocity", "commanded_acceleration"]
+    signals = np.rec.fromarrays([times, *wanted[:3]], names=names)
+    # FMPy draws straight lines between values, and looks a little ahead of them: no corner may be crossed.
+    options = {"stop_time": 0.2, "step_size": STEP, "output_interval": STEP, "input": signals}
+    found, again = (fmpy.simulate_fmu(str(out), **options) for _ in range(2))
+    assert np.array_equal(found, again)
+    assert len(found) == len(times)
+    for name in ("motor_angle", "motor_velocity", "output_angle", "output_torque"):
+        largest = np.abs(whole[name]).max()
+        assert np.abs(found[name] - whole[name]).max() < 1e-5 * largest, name
+    description = fmpy.read_model_description(str(out))
+    about = {variable.name: variable for variable in description.modelVariables}
+    assert about["output_torque"].unit == "N m"
+    assert about["commanded_angle"].description == "commanded angle, at the output"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fmi", "kind"), [(2, FMU2Slave), (3, FMU3Slave)])
+def test_a_state_that_is_set_again_goes_on_bit_for_bit(
+    fmi: int, kind: Any, scenario: Scenario, tmp_path: Path
+) -> None:
+    out = export_fmu(scenario, tmp_path / f"again{fmi}.fmu", fmi=fmi, motor="torque")
+    description = fmpy.read_model_description(str(out))
+    at = {variable.name: variable.valueReference for variable in description.modelVariables}
+    unzipped = fmpy.extract(str(out), str(tmp_path / "unzipped"))
+    name = description.coSimulation.modelIdentifier
+    slave = kind(guid=description.guid, unzipDirectory=unzipped, modelIdentifier=name, instanceName="one")
+    put, get = (slave.setReal, slave.getReal) if fmi == 2 else (slave.setFloat64, slave.getFloat64)
+    save, back = (
+        (slave.getFMUstate, slave.setFMUstate) if fmi == 2 else (slave.getFMUState, slave.setFMUState)
+    )
+    slave.instantiate()
+    if fmi == 2:
+        slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    put([at["motor_torque"]], [0.2])
+    slave.exitInitializationMode()
+    slave.doStep(0.0, STEP)
+    state = save()
+    ways = []
+    for _ in range(2):
+        for k in range(1, 4):
+            slave.doStep(k * STEP, STEP)
+        ways.append(get([at["motor_angle"], at["output_torque"]]))
+        back(state)
+    (slave.freeFMUstate if fmi == 2 else slave.freeFMUState)(state)
+    assert ways[0] == ways[1]
+    assert ways[0][0] > 0
+    slave.terminate()
+    slave.freeInstance()
+
+
+def test_mistakes_are_said(
+    scenario: Scenario, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(scenario.to_yaml(), encoding="utf-8")
+    for arguments, said in [
+        ([path, tmp_path / "a.fmu", "--motor", "velocity"], "found the motor command 'position'"),
+        ([path, tmp_path / "a.csv", "--fmi", "3"], "--fmi belongs to .fmu"),
+        ([path, tmp_path / "a.txt"], "allowed: .csv, .parquet, .mcap, .fmu, .xml"),
+        ([path, path / "a.fmu"], "cannot be written"),
+    ]:
+        with pytest.raises(SystemExit) as stopped:
+            cli.main(["export", *map(str, arguments)])
+        err = capsys.readouterr().err
+        assert (stopped.value.code, err.count("\n")) == (2, 1)
+        assert said in err
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"needs pythonfmu: pip install 'hdsim\[fmi\]'"):
+        export_fmu(scenario, tmp_path / "a.fmu")
+    assert [one.name for one in tmp_path.iterdir()] == ["a.yaml"]
