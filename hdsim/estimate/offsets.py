@@ -57,8 +57,8 @@ def offsets_of(
             weight = float(one.train.sum()) / one.sigma**2
             common, weights = common + weight * means[k], weights + weight
         for k, mean in means.items():
-            if weights == 0.0:
-                found[k] = mean  # only the proof sees this channel
+            if weights == 0.0 or len(means) == 1:
+                found[k] = mean  # nobody shares it, or only the proof sees this channel
                 continue
             zero = common / weights
             bound = DRIFT * series[k].noise if drift else 0.0
@@ -67,7 +67,7 @@ def offsets_of(
 
 
 def offset_columns(series: Sequence[Series], training: int, zeros: Zeros) -> Array:
-    """What a shift of each zero does to the whitened training samples, shape (rows, zeros).
+    """What a shift of each zero does to the whitened training samples, shape (rows, zeros), its largest as 1.
 
     Args:
         series: all of them.
@@ -80,7 +80,8 @@ def offset_columns(series: Sequence[Series], training: int, zeros: Zeros) -> Arr
     for group in groups(series, zeros):
         if not any(sizes.get(k) for k in group):
             continue
+        least = min(series[k].sigma for k in group if k in sizes)
         columns.append(
-            np.concatenate([np.full(sizes[k], 1.0 / series[k].sigma if k in group else 0.0) for k in seen])
+            np.concatenate([np.full(sizes[k], least / series[k].sigma if k in group else 0.0) for k in seen])
         )
     return np.column_stack(columns)
