@@ -71,8 +71,10 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
     if joint == 6:
         # The torque sensor ripples twice a wave-generator turn (200 per output turn, ratio 100); the
         # motor's own order 12 is 1200 per output turn, 2 % of what was missing, but a sharp line.
-        seen = {(place.channel, order) for place in found.located for order in place.orders}
-        assert {("output_torque", 2.0), ("motor_torque", 12.0)} <= seen
+        named = {
+            (e.name, p.value) for e in found.effects for path, p in e.parameters.items() if "order" in path
+        }
+        assert {("sensors", 2.0), ("motor_torque_ripple", 12.0)} <= named
 
 
 @pytest.mark.slow
