@@ -10,53 +10,83 @@ import numpy as np
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.numbers import delay_freedoms
-from hdsim.estimate.orders import LEAST_LINE, over_angle
+from hdsim.estimate.orders import LEAST_LINE, OverAngle, over_angle
 from hdsim.estimate.records import Array
 
 #: Ages of a channel's readings that are tried, in samples (three spreads of what is believed of a delay), and
 #: factor by which an age must make the strongest line stronger (estimate: half of it is then lost without).
 OLDEST, AGE_STEP = 3.0, 0.25
 STRONGER = 2.0
+#: The same beside a line that turns with the direction: each of the two takes most of the other, and the true
+#: one is only a little better (estimate).
+CLEARER = 1.05
 
 
 def read_late(bench: Bench, current: Fit) -> Fit:
-    """A fit whose torques are as late beside the motion as lines in their order spectra tell."""
+    """A fit whose torques are as late beside the motion as lines in their order spectra tell.
+
+    The age must leave less of the channel as a whole: what the model predicts is read later, too.
+    """
     if any(each.step for each in current.frees):
         return current  # ages are fitted already
-    before, residuals = current.state, bench.residuals(current.predictions, drift=True)
-    torques = [
-        free.delay_of for free in delay_freedoms(before, bench.channels, 0.0, load_known=bench.load_known)
-    ]
-    ages = {c: age_by_lines(bench, residuals, c) for c in torques if c not in before.delays}
-    delays = {channel: age for channel, age in ages.items() if age != 0.0}
-    if not delays:
-        return current
-    state = replace(before, delays={**before.delays, **delays})
-    return replace(current, state=state, predictions=bench.reread(current.predictions, before, state))
+    before = current.state
+    for free in delay_freedoms(before, bench.channels, 0.0, load_known=bench.load_known):
+        channel = free.delay_of
+        if channel in before.delays:
+            continue
+        age, left = age_by_lines(bench, bench.residuals(current.predictions, drift=True), channel)
+        if age == 0.0:
+            continue
+        state = replace(current.state, delays={**current.state.delays, channel: age})
+        predictions = bench.reread(current.predictions, current.state, state)
+        over = over_angle(bench, bench.residuals(predictions, drift=True), channel)
+        if over is not None and _left(over, _lines(over, age)) < left:
+            current = replace(current, state=state, predictions=predictions)
+    return current
 
 
-def age_by_lines(bench: Bench, residuals: Sequence[Array], channel: str) -> float:
+def age_by_lines(bench: Bench, residuals: Sequence[Array], channel: str) -> tuple[float, float]:
     """Age of a channel's readings beside the motion at which an order stands out of it, s.
 
     A channel that is read late shows an order blurred wherever the speed varies, and its lines are too weak
-    to be located. 0 where no age makes the strongest line much stronger.
+    to be located. 0 where no age makes the strongest line much stronger, or where one that turns its sign
+    with the direction, as friction does, is as strong.
 
     Args:
         bench: the measured series.
         residuals: of every series, SI units.
         channel: its name.
+
+    Returns:
+        The age, and the mean square that the strongest line without an age leaves.
     """
     over = over_angle(bench, residuals, channel)
     if over is None or over.highest < 1.0:
-        return 0.0
-    orders = np.arange(1.0, int(over.highest) + 1)
+        return 0.0, 0.0
     ages = over.period_s * np.arange(-OLDEST, OLDEST + AGE_STEP / 2, AGE_STEP)
-    waves = over.value * np.exp(-1j * np.outer(orders, over.angle - ages[0] * over.velocity))
-    older = np.exp(1j * np.outer(orders, (ages[1] - ages[0]) * over.velocity))
-    shares = np.zeros((len(ages), len(orders)))
-    for k in range(len(ages)):
-        shares[k] = 2.0 * np.abs(waves.mean(axis=1)) ** 2 / np.mean(over.value**2)
-        waves *= older
-    strongest = shares.max(axis=1)
-    best, now = int(np.argmax(strongest)), int(np.argmin(np.abs(ages)))
-    return float(ages[best]) if strongest[best] > max(LEAST_LINE, STRONGER * strongest[now]) else 0.0
+    strongest = np.array([_lines(over, age).max() for age in ages])
+    turning = replace(over, value=over.value * np.sign(over.velocity))
+    now, turned = float(_lines(over, 0.0).max()), float(_lines(turning, 0.0).max())
+    best = int(np.argmax(strongest))
+    stands_out = strongest[best] > max(LEAST_LINE, STRONGER * now, CLEARER * turned)
+    left = float(np.mean(over.value**2)) * (1.0 - max(now, turned))
+    return (float(ages[best]) if stands_out else 0.0), left
+
+
+def _lines(over: OverAngle, age: float) -> Array:
+    """Share of a channel's power at every whole order that can be seen, where it is read so late."""
+    orders = np.arange(max(1.0, np.ceil(over.lowest)), int(over.highest) + 1)
+    angle = over.angle - age * over.velocity
+    # Powers of one wave: a product for each order instead of a sine and a cosine.
+    wave = np.exp(-1j * angle)
+    waves = np.exp(-1j * orders[0] * angle) * over.value
+    shares = np.zeros(len(orders))
+    for k in range(len(orders)):
+        shares[k] = 2.0 * abs(waves.mean()) ** 2
+        waves *= wave
+    return shares / float(np.mean(over.value**2))
+
+
+def _left(over: OverAngle, shares: Array) -> float:
+    """Mean square that the strongest line leaves."""
+    return float(np.mean(over.value**2)) * (1.0 - float(shares.max()))

@@ -37,7 +37,7 @@ def test_the_age_of_a_torque_is_told_by_the_order_that_it_blurs(late):
     then = np.interp(time - 1e-3 * late, time, angle)
     torque = 0.01 * np.sin(12 * then) + 0.004 * np.random.default_rng(2).standard_normal(len(time))
     bench = bench_of(time, angle, torque)
-    age = age_by_lines(bench, [torque], "motor_torque")
+    age, _ = age_by_lines(bench, [torque], "motor_torque")
     assert age == pytest.approx(1e-3 * late, abs=2.5e-4)
 
 
@@ -47,4 +47,13 @@ def test_a_torque_without_lines_has_no_age():
     torque = 0.01 * np.sign(np.sin(0.5 * np.pi * time)) + 0.01 * np.random.default_rng(2).standard_normal(
         6000
     )
-    assert age_by_lines(bench_of(time, angle, torque), [torque], "motor_torque") == 0.0
+    assert age_by_lines(bench_of(time, angle, torque), [torque], "motor_torque")[0] == 0.0
+
+
+def test_friction_that_ripples_is_not_late():
+    # It turns its sign with the direction, as the phase of a late order does.
+    time = np.arange(6000) * 1e-3
+    angle = 60.0 * (1 - np.cos(0.5 * np.pi * time))
+    turning = np.sign(np.sin(0.5 * np.pi * time))
+    torque = 0.01 * turning * np.sin(2 * angle) + 0.001 * np.random.default_rng(2).standard_normal(6000)
+    assert age_by_lines(bench_of(time, angle, torque), [torque], "motor_torque")[0] == 0.0
