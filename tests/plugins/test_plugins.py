@@ -129,10 +129,9 @@ def test_a_scenario_takes_all_of_them(folder: Path) -> None:
 import hdsim
 from hdsim.drive.parameters import Drive
 from hdsim.scenario import Scenario, json_schema
-from hdsim.studies.known_metrics import measure
 scenario = hdsim.load_scenario("all.yaml")
 assert scenario.drive.rated_torque_nm == 33
-assert measure(["top_speed"], hdsim.simulate(scenario), scenario)["top_speed"] > 0
+assert hdsim.simulate(scenario).metrics()["top_speed"].value > 0
 schema = str(json_schema(Scenario))
 assert all(name in schema for name in ("eddy_current_brake", "soft", "gentle"))
 assert Drive.model_validate({"preset": "my-joint", "mesh": {"model": "teeth", "contact": {"law": "soft"}}})

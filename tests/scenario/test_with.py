@@ -50,7 +50,7 @@ def test_a_choice_drops_the_other_choices_numbers_in_whatever_order_they_come(ba
         ("laod.inertia_kg_m2", 1.0, "expected 'load.inertia_kg_m2'"),
         ("effects.backlash", {}, "expected 'effects.output_backlash'"),
         ("effects.lugre_friction.bristle", 1.0, "effects.lugre_friction is off; turn it on first"),
-        ("load.inertia_kg_m2", -1.0, "found -1.0 (number), expected a number greater than 0"),
+        ("load.inertia_kg_m2", -1.0, "found -1.0 (number), expected a number at least 0"),
         ("load.inertia_kg_m2", "1", "load.inertia_kg_m2: found '1' (text), expected a number"),
         ("drive.preset", "csg-20-50", "'drive': {'preset': 'csg-20-50'}"),
         ("drive", {"preset": "csg-20-51"}, "unknown preset 'csg-20-51'"),
