@@ -117,6 +117,8 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     # Beside others each is asked what held-out data show of its own.
     held_out = law.held if k and law.held is not None else evidence.held
     held = rules.held * _held(held_out, rules)
+    # A sharp line that data hold which no step has seen is none that the search has chosen of many.
+    repeats = law.sharp and law.held is not None and _repeats(law.held, rules)
     found = [
         # What all explain together speaks for the first; of a later one it only says that all are too little.
         (
@@ -124,7 +126,11 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
             evidence.explained,
             min(explained, 0.0) if k else explained,
         ),
-        ("held-out data show the promised change", held_out.slope, min(held, 0.0) if k else held),
+        (
+            "held-out data show the promised change",
+            held_out.slope,
+            min(held, 0.0) if k and not repeats else held,
+        ),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
     left = law.own_left
@@ -140,8 +146,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     if law.at_limit:
         found.append(("a number stands at the end of its range", 1.0, rules.limit))
     if k > 0:
-        if not (law.sharp and law.held is not None and _repeats(law.held, rules)):
-            # A sharp line that data hold which no step has seen is none that the search has chosen of many.
+        if not repeats:
             found.append(("one more effect", float(k), rules.later))
         found.append(
             ("part of what would be missing without it", law.needed, rules.needed * _log_odds(law.needed))

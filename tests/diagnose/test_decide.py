@@ -115,3 +115,28 @@ def test_every_rule_says_its_unit_and_what_calibrated_it():
         assert field.description, name
         assert extra["unit"], name
         assert extra["calibrated_by"], name
+
+
+def test_a_sharp_line_that_held_out_data_repeat_is_named_beside_a_larger_effect():
+    """A ripple of the torque sensor beside friction: half of what is missing there, all of it again elsewhere."""
+    seen, vague = HeldOutEvidence(slope=0.97, spread=0.02), HeldOutEvidence(slope=0.97, spread=0.5)
+    first = law("input_coulomb_viscous")
+
+    def named(held, *, sharp=True):
+        line = law("sensors", gain=0.01, needed=0.5, own_left=0.3, sharp=sharp, held=held)
+        return decide(found(first, line, held=HeldOutEvidence(slope=1.0, spread=0.05))).names
+
+    assert named(seen) == [0, 1]
+    # Not where it may be chance, nor a law that a search can bend.
+    assert named(vague) == named(seen, sharp=False) == [0]
+
+
+def test_a_later_effect_whose_own_change_held_out_data_do_not_show_is_not_named():
+    absent, there = (HeldOutEvidence(slope=slope, spread=0.1) for slope in (0.2, 1.0))
+    first = law("input_coulomb_viscous")
+
+    def confidence(held):
+        whole = HeldOutEvidence(slope=1.0, spread=0.05)  # the first one's, by far the larger
+        return decide(found(first, law("sensors", needed=0.9, held=held), held=whole)).confidence[1]
+
+    assert confidence(absent) < 0.5 < confidence(there)

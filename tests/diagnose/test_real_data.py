@@ -22,8 +22,9 @@ REGRESSED_NM = {1: 0.0093, 3: 0.0100, 4: 0.0101, 6: 0.0048, 7: 0.0083}
 #: Names of one thing for these data: friction that turns with the direction.
 FRICTIONS = {"input_coulomb_viscous", "lugre_friction", "load_dependent_loss", "stribeck_friction"}
 #: Amplitudes of SOURCE.md, N m at the output: of the torque sensor's order 2, of the motor's order 12.
-RIPPLE_NM = {1: ("sensors", "output_torque.ripple.0", "amplitude_nm", 2.0, 0.167, 1.0),
-             7: ("motor_torque_ripple", "components.0", "cogging_nm", 12.0, 1.2, 100.0)}  # fmt: skip
+SENSORS = ("sensors", "output_torque.ripple.0", "amplitude_nm", 2.0)
+MOTOR = ("motor_torque_ripple", "components.0", "cogging_nm", 12.0)
+RIPPLE_NM = {1: [(*SENSORS, 0.167, 1.0)], 7: [(*SENSORS, 0.054, 1.0), (*MOTOR, 1.2, 100.0)]}
 
 #: Lost motion of the actuator's loops at zero torque, as read off the recording.
 LOST_MOTION_DEG = 3.2
@@ -60,8 +61,7 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
     assert inertia.value > 0.1 * inertia.start
     # The mapping masks the control loop's hiccups, or the check finds them: said either way.
     assert any(p.kind in ("spikes", "missing") and p.channel == "motor_torque" for p in found.data_problems)
-    if joint in RIPPLE_NM:
-        name, place, size, order, amplitude, ratio = RIPPLE_NM[joint]
+    for name, place, size, order, amplitude, ratio in RIPPLE_NM.get(joint, []):
         ripple = next(effect for effect in found.effects if effect.name == name)
         assert ripple.parameters[f"{place}.order"].value == order
         assert ratio * ripple.parameters[f"{place}.{size}"].value == pytest.approx(amplitude, rel=0.2)
