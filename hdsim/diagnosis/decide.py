@@ -114,8 +114,8 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     # What is left elsewhere than in its own coordinate is another effect's, and counts half.
     seen = 0.5 * (_log_odds(evidence.explained) + _log_odds(1.0 - law.own_left))
     explained = rules.explained * (seen - _log_odds(rules.explained_even))
-    # Beside others each is asked what held-out data show of its own.
-    held_out = law.held if k and law.held is not None else evidence.held
+    # Each is asked what held-out data show of its own; of all together it only speaks against a later one.
+    held_out = law.held if law.held is not None else evidence.held
     held = rules.held * _held(held_out, rules)
     # A sharp line that data hold which no step has seen is none that the search has chosen of many.
     repeats = law.sharp and law.held is not None and _repeats(law.held, rules)
@@ -129,7 +129,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
         (
             "held-out data show the promised change",
             held_out.slope,
-            min(held, 0.0) if k and not repeats else held,
+            min(held, 0.0) if k and law.held is None else held,
         ),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
@@ -155,8 +155,8 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
 
 
 def _repeats(held: HeldOutEvidence, rules: Rules) -> bool:
-    """Whether held-out data show a change by itself beyond chance, and more of it than none."""
-    return held.slope > 0.5 and held.slope > rules.repeats * held.spread
+    """Whether held-out data show a change by itself beyond chance, and nearly all of it."""
+    return held.slope > 1.0 - rules.held_mismatch and held.slope > rules.repeats * held.spread
 
 
 def _held(held: HeldOutEvidence, rules: Rules) -> float:

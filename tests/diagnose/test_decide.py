@@ -118,7 +118,7 @@ def test_every_rule_says_its_unit_and_what_calibrated_it():
 
 
 def test_a_sharp_line_that_held_out_data_repeat_is_named_beside_a_larger_effect():
-    """A ripple of the torque sensor beside friction: half of what is missing there, all of it again elsewhere."""
+    """A ripple of the torque sensor beside friction: half of what is missing, all of it elsewhere."""
     seen, vague = HeldOutEvidence(slope=0.97, spread=0.02), HeldOutEvidence(slope=0.97, spread=0.5)
     first = law("input_coulomb_viscous")
 
