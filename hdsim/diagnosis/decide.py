@@ -114,8 +114,8 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     # What is left elsewhere than in its own coordinate is another effect's, and counts half.
     seen = 0.5 * (_log_odds(evidence.explained) + _log_odds(1.0 - law.own_left))
     explained = rules.explained * (seen - _log_odds(rules.explained_even))
-    # Each is asked what held-out data show of its own. A later one that is no line is bent to what is left, and
-    # so to much of what is left elsewhere: for it they only speak against.
+    # Each is asked what held-out data show of its own. A later one that is no line is bent to what is left,
+    # and so to much of what is left elsewhere: for it they only speak against.
     held_out = law.held if law.held is not None else evidence.held
     held = rules.held * _held(held_out, rules)
     # A sharp line that data hold which no step has seen is none that the search has chosen of many.
