@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
@@ -13,6 +13,10 @@ from hdsim.actuation.arm import Arm
 from hdsim.actuation.signals import TorqueSignal
 from hdsim.number import Number
 from hdsim.parts import Builder, Part
+
+if TYPE_CHECKING:
+    from hdsim.actuation.signal_data import SignalData
+    from hdsim.kernel import Kernel
 
 #: Standard acceleration of free fall, m/s^2 (ISO 80000-3).
 STANDARD_GRAVITY = 9.80665
@@ -38,6 +42,22 @@ class GravityArm(Part):
         """Add the torque of gravity and its energy."""
         moment = self.mass_kg * self.gravity_m_per_s2 * self.centre_of_mass_m
         build.element(gravity_arm, [moment, math.radians(self.hanging_angle_deg)])
+
+
+class SignalTorque:
+    """A torque over time, on the output or by another kernel elsewhere.
+
+    Args:
+        signal: the torque, N m.
+        kernel: what adds it.
+    """
+
+    def __init__(self, signal: SignalData, kernel: Kernel = load_torque) -> None:
+        self.signal, self.kernel = signal, kernel
+
+    def contribute(self, build: Builder) -> None:
+        """Add the torque."""
+        build.element(self.kernel, [build.signal(self.signal)])
 
 
 class Load(Part):
@@ -74,7 +94,7 @@ class Load(Part):
     def contribute(self, build: Builder) -> None:
         """Add the external torque and gravity; inertia and arm are the assembly's to ask for (``over``)."""
         if self.torque is not None:
-            build.element(load_torque, [build.signal(self.torque.data)])
+            SignalTorque(self.torque.data).contribute(build)
         if self.gravity is not None:
             self.gravity.contribute(build)
 

@@ -50,7 +50,6 @@ def collect(
     last = found.stages[-1].location
     explained = bench.power(base.fit.predictions) - bench.power(found.fit.predictions)
     left = last.structured * found.left.power
-    slope, spread = borne_out(bench, predictions) if found.named else (1.0, 0.0)
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
         laws=[
@@ -66,7 +65,7 @@ def collect(
         explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
         left=last.structured,
         left_chance=last.chance,
-        held=HeldOutEvidence(slope=slope, spread=min(spread, 1e6)),
+        held=_held(bench, predictions) if found.named else HeldOutEvidence(),
         rest=_rest(bench, found.fit.predictions),
         fell=max((1.0 - g.refit / g.before for g in gap.values() if g.before > 0), default=0.0),
         moved=[i.name for i in base.moved],
@@ -99,11 +98,15 @@ def _own_held(bench: Bench, state: State, k: int, predictions: Sequence[Array]) 
     """What held-out data say of one effect beside all others."""
     less = replace(state, added=(*state.added[:k], *state.added[k + 1 :]))
     try:
-        slope, spread = borne_out(
-            bench, {"refit": bench.predict(less, everything=True), "after": predictions}
-        )
+        without = bench.predict(less, everything=True)
     except PredictionError:
         return None
+    return _held(bench, {"refit": without, "after": predictions})
+
+
+def _held(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> HeldOutEvidence:
+    """How much of what was added shows in held-out data."""
+    slope, spread = borne_out(bench, predictions)
     return HeldOutEvidence(slope=slope, spread=min(spread, 1e6))
 
 

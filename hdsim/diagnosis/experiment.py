@@ -241,10 +241,8 @@ def _simulated(
 ) -> dict[str, Array] | None:
     """The channels that an experiment measures under a model, without its start; None when it fails."""
     from hdsim.actuation.command import Command
-    from hdsim.actuation.loads import Load
+    from hdsim.actuation.loads import Load, SignalTorque
     from hdsim.drive.model import Model
-    from hdsim.estimate.known_load import MeasuredTorque
-    from hdsim.estimate.predict import PredictionError
     from hdsim.simulation.run import Run
 
     try:
@@ -273,7 +271,7 @@ def _simulated(
     parts: list[Any] = [*effects.values()]
     if experiment.load_torque is not None:
         load = load.model_copy(update={"torque": None})
-        parts.append(MeasuredTorque(experiment.load_torque))
+        parts.append(SignalTorque(experiment.load_torque))
     parts.append(load)
     model = Model(
         drive.resolved(), parts, load_inertia_kg_m2=load.inertia_kg_m2, motions=motions, seed=candidate.seed

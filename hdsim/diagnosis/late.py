@@ -40,7 +40,7 @@ def read_late(bench: Bench, current: Fit) -> Fit:
         state = replace(current.state, delays={**current.state.delays, channel: age})
         predictions = bench.reread(current.predictions, current.state, state)
         over = over_angle(bench, bench.residuals(predictions, drift=True), channel)
-        if over is not None and _left(over, _lines(over, age)) < left:
+        if over is not None and _left(over, _strongest(over, age)) < left:
             current = replace(current, state=state, predictions=predictions)
     return current
 
@@ -64,17 +64,16 @@ def age_by_lines(bench: Bench, residuals: Sequence[Array], channel: str) -> tupl
     if over is None or over.highest < 1.0:
         return 0.0, 0.0
     ages = over.period_s * np.arange(-OLDEST, OLDEST + AGE_STEP / 2, AGE_STEP)
-    strongest = np.array([_lines(over, age).max() for age in ages])
+    strongest = np.array([_strongest(over, age) for age in ages])
     turning = replace(over, value=over.value * np.sign(over.velocity))
-    now, turned = float(_lines(over, 0.0).max()), float(_lines(turning, 0.0).max())
+    now, turned = _strongest(over, 0.0), _strongest(turning, 0.0)
     best = int(np.argmax(strongest))
     stands_out = strongest[best] > max(LEAST_LINE, STRONGER * now, CLEARER * turned)
-    left = float(np.mean(over.value**2)) * (1.0 - max(now, turned))
-    return (float(ages[best]) if stands_out else 0.0), left
+    return (float(ages[best]) if stands_out else 0.0), _left(over, max(now, turned))
 
 
-def _lines(over: OverAngle, age: float) -> Array:
-    """Share of a channel's power at every whole order that can be seen, where it is read so late."""
+def _strongest(over: OverAngle, age: float) -> float:
+    """Largest share of a channel's power at a whole order that can be seen, where it is read so late."""
     orders = np.arange(max(1.0, np.ceil(over.lowest)), int(over.highest) + 1)
     angle = over.angle - age * over.velocity
     # Powers of one wave: a product for each order instead of a sine and a cosine.
@@ -84,9 +83,9 @@ def _lines(over: OverAngle, age: float) -> Array:
     for k in range(len(orders)):
         shares[k] = 2.0 * abs(waves.mean()) ** 2
         waves *= wave
-    return shares / float(np.mean(over.value**2))
+    return float(shares.max() / np.mean(over.value**2))
 
 
-def _left(over: OverAngle, shares: Array) -> float:
-    """Mean square that the strongest line leaves."""
-    return float(np.mean(over.value**2)) * (1.0 - float(shares.max()))
+def _left(over: OverAngle, share: float) -> float:
+    """Mean square that a line of this share leaves."""
+    return float(np.mean(over.value**2)) * (1.0 - share)

@@ -250,8 +250,9 @@ class Bench:
             drift: whether zeros may drift between records: where what is missing is judged, not where numbers
                 are fitted, which would be bent by as much as is forgiven.
         """
-        offsets = self.offsets(predictions, drift=drift)
-        return [apart - offset for apart, offset in zip(self.apart(predictions), offsets, strict=True)]
+        apart = self.apart(predictions)
+        offsets = offsets_of(self.series, apart, self.zeros, drift=drift)
+        return [rest - offset for rest, offset in zip(apart, offsets, strict=True)]
 
     def apart(self, predictions: Sequence[Array]) -> list[Array]:
         """Measured less predicted; empty where nothing is predicted."""

@@ -11,22 +11,8 @@ from hdsim.estimate.spline import smoothed
 
 if TYPE_CHECKING:
     from hdsim.actuation.arm import Arm, Course
-    from hdsim.actuation.signal_data import SignalData
     from hdsim.estimate.records import Array, Record
     from hdsim.parts import Builder
-
-
-class MeasuredTorque:
-    """A measured torque on the output."""
-
-    def __init__(self, torque: SignalData) -> None:
-        self.torque = torque
-
-    def contribute(self, build: Builder) -> None:
-        """Add the torque to the output."""
-        from hdsim.actuation._kernels import load_torque
-
-        build.element(load_torque, [build.signal(self.torque)])
 
 
 class Gravity:

@@ -19,7 +19,7 @@ import numpy as np
 
 from hdsim.errors import InputError, PhysicsError
 from hdsim.estimate.knots import least_squares_spline
-from hdsim.estimate.known_load import Gravity, MeasuredTorque, arm_course
+from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, signal, smoothed
@@ -262,6 +262,7 @@ class Predictor:
         Raises:
             PredictionError: the model cannot be, or could not be integrated.
         """
+        from hdsim.actuation.loads import SignalTorque
         from hdsim.actuation.shapes import Hold
         from hdsim.actuation.signal_data import SignalData
         from hdsim.drive.model import Model
@@ -271,11 +272,11 @@ class Predictor:
         load = candidate.load
         parts: list[Any] = [*candidate.effects.values(), Gravity(load)]
         if self.load_torque is not None:
-            parts.append(MeasuredTorque(self.load_torque))
+            parts.append(SignalTorque(self.load_torque))
         elif load.torque is not None:
             # The scenario's load begins with the record, after the lead-in.
             late = LEAD_IN_S - self.record.begins_s
-            parts.append(MeasuredTorque(SignalData(load.torque.data.move.delayed(late))))
+            parts.append(SignalTorque(SignalData(load.torque.data.move.delayed(late))))
         inertia = load.inertia_kg_m2
         if self.course is not None:
             arm = self.course.part(load.arm, LEAD_IN_S)

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from hdsim.actuation import _signal_kernel as law
-from hdsim.actuation._kernels import load_torque, motor_torque
+from hdsim.actuation._kernels import motor_torque
 from hdsim.actuation.command import LockedCommand, MotionCommand, PositionCommand, VelocityCommand
+from hdsim.actuation.loads import SignalTorque
 from hdsim.actuation.signal_data import Move, SignalData, hold
 from hdsim.drive import _layout as layout
 from hdsim.errors import InputError
 
 if TYPE_CHECKING:
     from hdsim.drive.model import Model
-    from hdsim.kernel import Kernel
     from hdsim.parts import Builder
     from hdsim.scenario import Scenario
 
@@ -23,16 +23,6 @@ MotorInput = Literal["torque", "angle", "velocity", "motion"]
 OutputInput = Literal["torque", "motion"]
 
 _UNITS = {"torque": "N m", "angle": "rad", "velocity": "rad/s", "acceleration": "rad/s^2"}
-
-
-class _Torque:
-    """An input torque on the motor or on the output."""
-
-    def __init__(self, kernel: Kernel, signal: SignalData) -> None:
-        self.kernel, self.signal = kernel, signal
-
-    def contribute(self, build: Builder) -> None:
-        build.element(self.kernel, [build.signal(self.signal)])
 
 
 class _Servo:
@@ -101,7 +91,7 @@ def motor_given(scenario: Scenario, kind: MotorInput | None) -> Given:
     signal = _held()
     if kind == "torque":
         about = "torque of the motor on its shaft"
-        return Given(("motor_torque",), signal, about, _Torque(motor_torque, signal))
+        return Given(("motor_torque",), signal, about, SignalTorque(signal, motor_torque))
     if kind == "motion":
         return _motion("motor")
     wanted = "position" if kind == "angle" else "velocity"
@@ -127,7 +117,7 @@ def output_given(scenario: Scenario, kind: OutputInput | None) -> Given:
     if kind == "motion":
         return _motion("output")
     signal = _held()
-    return Given(("load_torque",), signal, "external torque on the output", _Torque(load_torque, signal))
+    return Given(("load_torque",), signal, "external torque on the output", SignalTorque(signal))
 
 
 def _motion(side: str) -> Given:

@@ -16,6 +16,9 @@ from hdsim.console import console
 _workers = click.option(
     "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes on this machine."
 )
+_output = click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture [default: results]."
+)
 _scheduler = click.option(
     "--scheduler",
     metavar="ADDRESS",
@@ -150,9 +153,7 @@ def _with_interval(interval: Any, form: str) -> str:
     "--orders", type=click.IntRange(min=2), default=16, show_default=True,
     help="Orders drawn for the shares of more than six causes; fewer have exact shares.",
 )  # fmt: skip
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture [default: results]."
-)
+@_output
 @_workers
 @_scheduler
 def budget(
@@ -245,9 +246,7 @@ def _tell_budget(found: Any) -> None:
     "--seed", type=click.IntRange(min=0), default=0, show_default=True,
     help="Seed of the drives after the scenario's own.",
 )  # fmt: skip
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture [default: results]."
-)
+@_output
 @_workers
 @_scheduler
 def tolerance(
