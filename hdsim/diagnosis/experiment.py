@@ -243,6 +243,7 @@ def _simulated(
     from hdsim.actuation.command import Command
     from hdsim.actuation.loads import Load, SignalTorque
     from hdsim.drive.model import Model
+    from hdsim.estimate.predict import PredictionError
     from hdsim.simulation.run import Run
 
     try:
