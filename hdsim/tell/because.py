@@ -1,4 +1,4 @@
-"""Why a verdict came about: its reasons in plain words, the weighing of each name apart from plain limits."""
+"""Why a verdict came about: the evidence for and against each effect, and the thresholds that were tested."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Side = Literal["at least", "at most", "more than", ""]
 
 @dataclass(frozen=True)
 class Wording:
-    """How a rule is told: its words, how its numbers are written, on which side of its limit it is met."""
+    """How a rule is written: its text, the format of its values, on which side of its threshold it is met."""
 
     words: str
     shown: Callable[[float], str] = short
@@ -32,33 +32,33 @@ def _part(share: float) -> str:
 #: By the rule's own name, as ``decide`` has it.
 WORDINGS = {
     "part of the structure that the names explain": Wording(
-        "what the named effects explain together, of all that repeats", _part
+        "share of the systematic residual that the identified effects explain together", _part
     ),
     "held-out data show the promised change": Wording(
-        "how much of the change that it promises shows in held-out data", _part
+        "share of its predicted change that held-out data confirm", _part
     ),
-    "resampled records that it wins": Wording("resampled records in which it, or its group, is best", _part),
+    "resampled records that it wins": Wording(
+        "share of resampled records in which it, or its group, fits best", _part
+    ),
     "a number stands at the end of its range": Wording(
-        "one of its numbers stands at the end of its range", lambda _: "yes"
+        "one of its parameters is at a bound of its range", lambda _: "yes"
     ),
     "part of the structure in its own coordinate that it leaves": Wording(
-        "what it leaves in its own coordinate, of that and what it explains", _part
+        "residual over its own regressor, relative to that and what it explains", _part
     ),
-    "one more effect": Wording("not the first: a further effect", lambda k: f"no. {k + 1:.0f}"),
+    "one more effect": Wording("a further effect, not the first", lambda k: f"no. {k + 1:.0f}"),
     "part of what would be missing without it": Wording(
-        "part of what the other effects alone leave that it explains", _part
+        "share of the other effects' residual that it explains", _part
     ),
     "structure is left by chance": Wording(
-        "chance that pure noise shows as much of a pattern as is left", below, "at most"
+        "p-value: as much systematic residual from noise alone", below, "at most"
     ),
-    "part of what is left that is structure": Wording(
-        "part of what is left that is a pattern", _part, "at least"
-    ),
+    "part of what is left that is structure": Wording("systematic share of the residual", _part, "at least"),
     "what is left, in units of the noise": Wording(
-        "what is left of the worst channel, in units of its noise", times, "more than"
+        "residual of the worst channel, relative to its noise", times, "more than"
     ),
     "the re-fit closes a held-out gap": Wording(
-        "part of a held-out gap that the re-fitted numbers close", _part, "at least"
+        "reduction of a held-out residual by the re-fit", _part, "at least"
     ),
 }
 #: A rule that is not known here is told by its own name.
@@ -73,7 +73,7 @@ def wording(rule: str) -> Wording:
 
 @dataclass(frozen=True)
 class Weight:
-    """One piece of evidence for or against a name: words, what was seen, what it adds to the log odds."""
+    """One piece of evidence for or against an effect: text, observed value, what it adds to the log odds."""
 
     words: str
     seen: str
@@ -82,14 +82,14 @@ class Weight:
 
 @dataclass
 class Weighing:
-    """All that was weighed of one name.
+    """All the evidence on one effect.
 
     Attributes:
-        name: of the effect, in the catalogue.
+        name: key of the effect in the catalogue.
         weights: pieces of evidence in their order.
-        probability: that the name, or its group, is right; nan where it was not asked.
-        needed: least probability of a name that is given.
-        named: whether it is.
+        probability: that the effect, or its group, is the right one; nan where it was not tested.
+        needed: least probability of an effect that is identified.
+        named: whether it is identified.
     """
 
     name: str
@@ -112,7 +112,7 @@ class Weighing:
 
 @dataclass(frozen=True)
 class Condition:
-    """A rule with a plain limit: words, what was seen, the limit in words, whether it is met."""
+    """A rule with a threshold: text, observed value, the threshold as text, whether it is met."""
 
     words: str
     seen: str
@@ -121,7 +121,7 @@ class Condition:
 
 
 def weighings(because: Sequence[Reason]) -> list[Weighing]:
-    """What was weighed of each name, in the order in which they were found."""
+    """The evidence on each effect, in the order in which they were found."""
     found: list[Weighing] = []
     rules: set[str] = set()
     open_ = list[Weighing]()
@@ -150,7 +150,7 @@ def weighings(because: Sequence[Reason]) -> list[Weighing]:
 
 
 def conditions(because: Sequence[Reason]) -> list[Condition]:
-    """Rules with plain limits that were asked of the whole."""
+    """Rules with thresholds that were applied to the diagnosis as a whole."""
     return [_condition(reason) for reason in because if not reason.of]
 
 

@@ -1,4 +1,4 @@
-"""What can be learnt of the held-out data at all, beside what the model leaves of them."""
+"""Baselines: RMS residuals of regressions on the held-out data, beside the model's."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def last_model(verdict: Verdict) -> str:
     """What the model of ``after`` is called."""
     if verdict.verdict == "effect":
-        return "the named physics"
+        return "the model with the identified effects"
     return "the model with the curve" if verdict.curve is not None else "the fitted model"
 
 
@@ -32,9 +32,9 @@ def baselines(gaps: Mapping[str, Gap], model: str = "the fitted model") -> list[
             continue
         unit = unit_of(gap)
         regression, after, noise = (short(unit.factor * v) for v in (gap.regression, gap.after, gap.noise))
-        box = "" if gap.black_box is None else f", a black box {short(unit.factor * gap.black_box)}"
+        box = "" if gap.black_box is None else f", gradient boosting {short(unit.factor * gap.black_box)}"
         said.append(
-            f"{spoken(channel)}: a plain regression leaves {regression} {unit.name}{box}, {model} {after}, "
+            f"{spoken(channel)}: linear regression {regression} {unit.name}{box}, {model} {after}, "
             f"noise {noise}"
         )
     return said

@@ -23,10 +23,10 @@ def diagnose(
     force: bool,
     black_box: bool,
 ) -> int:
-    """Find what a model is missing against measured records.
+    """Find which physical effect a model is missing.
 
-    Checks the data, compares, fits the model's own numbers, locates what is left, names effects of the
-    catalogue, adds them, and proves it on data that no fit has seen.
+    Checks the data, compares them with the model, re-estimates the model's parameters, locates the residual,
+    identifies effects of the catalogue, adds them to the model, and validates it on held-out data.
     """
     from hdsim.diagnosis.workflow import diagnose as run
     from hdsim.tell.findings import gather

@@ -20,35 +20,37 @@ _DATA = click.Path(exists=True, path_type=Path)
 
 
 def measured_options(command: F) -> F:
-    """The argument and the options of a command that holds a model against measured records."""
+    """The argument and the options of a command that compares a model with measured records."""
     for option in reversed(
         (
             click.argument("measured", nargs=-1, required=True, type=_DATA),
             click.option("--model", required=True, type=_FILE, help="Scenario of the model."),
-            click.option("--mapping", type=_FILE, help="What the columns mean; a log of hdsim needs none."),
-            click.option("--holdout", multiple=True, type=_DATA, help="Records that only the proof sees."),
+            click.option(
+                "--mapping", type=_FILE, help="Mapping of the file's columns; a log of hdsim needs none."
+            ),
+            click.option("--holdout", multiple=True, type=_DATA, help="Validation records, used in no fit."),
             click.option(
                 "--out",
                 required=True,
                 type=click.Path(file_okay=False, path_type=Path),
-                help="Where to write.",
+                help="Folder of the results.",
             ),
             click.option(
                 "--load",
                 type=click.Choice(["scenario", "load_torque", "output_torque"]),
-                help="Where the load's torque comes from [load_torque when measured, else scenario].",
+                help="Source of the load torque [load_torque when measured, else scenario].",
             ),
             click.option(
                 "--zeros",
                 type=click.Choice(["campaign", "record"]),
                 default="campaign",
-                help="Whether torque sensors have one zero in all records, or one in each [campaign].",
+                help="Whether a torque sensor has one zero in all records, or one in each [campaign].",
             ),
-            click.option("--force", is_flag=True, help="Go on in spite of errors in the data."),
+            click.option("--force", is_flag=True, help="Continue in spite of errors in the data."),
             click.option(
                 "--black-box",
                 is_flag=True,
-                help="Also say what boosted trees leave of the held-out data (hdsim[baseline]).",
+                help="Also fit gradient-boosted trees as a black-box baseline (hdsim[baseline]).",
             ),
         )
     ):
@@ -59,14 +61,14 @@ def measured_options(command: F) -> F:
 def opened(
     measured: tuple[Path, ...], holdout: tuple[Path, ...], mapping: Path | None, model: Path, out: Path
 ) -> tuple[Scenario, list[Record], list[Record]]:
-    """The model, the records, and those that only the proof sees.
+    """The model, the records, and the validation records.
 
     Args:
         measured: files of the records.
         holdout: files of those that are held out.
-        mapping: what the columns mean.
+        mapping: of the files' columns.
         model: file of the scenario.
-        out: folder of the results: better known now than after minutes whether it can be written.
+        out: folder of the results; that it can be written is tested before the computation, not after.
 
     Raises:
         InputError: a record is both, a file cannot be read, or the folder cannot be written.

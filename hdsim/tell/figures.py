@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: the gap, measured against the model over time, the curve of what has no name."""
+"""Figures of a diagnosis: held-out residuals, measurement and model over time, an unidentified effect."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ WIDTH = 10.6
 STRETCH_SAMPLES, STRETCH_S = 900, 0.8
 #: Colours of the models, and of what was measured.
 MEASURED, BEFORE, REFIT, STEP, AFTER = style.BLACK, style.ORANGE, "#E69F00", "#8FCFB8", style.GREEN
+#: The models in legends, by stage.
+MODELS = {"before": "model before", "after": "model after"}
 
 
 Bars = list[tuple[str, float, tuple[float, float] | None, str]]
@@ -36,7 +38,7 @@ Bars = list[tuple[str, float, tuple[float, float] | None, str]]
 
 
 def gap_bars(found: Findings) -> dict[str, Bars]:
-    """The held-out gap of each channel: before, after the re-fit, after each effect, and at the end."""
+    """RMS residual of each channel on held-out data: as given, re-fitted, with each effect, final."""
     verdict = found.verdict
     curve = verdict.verdict == "unknown" and verdict.curve is not None
     many = len(verdict.effects)
@@ -48,7 +50,7 @@ def gap_bars(found: Findings) -> dict[str, Bars]:
     for channel, gap in verdict.gap.items():
         bars[channel] = [
             ("model as given", gap.before, gap.intervals.get("before"), BEFORE),
-            ("own numbers re-fitted", gap.refit, gap.intervals.get("refit"), own),
+            ("parameters re-fitted", gap.refit, gap.intervals.get("refit"), own),
         ]
         for step in found.steps:
             label = "with " + ", ".join(map(spoken, step.effects))
@@ -60,7 +62,7 @@ def gap_bars(found: Findings) -> dict[str, Bars]:
 
 
 def gap_figure(verdict: Verdict, found: dict[str, Bars]) -> Figure | None:
-    """Bars of the held-out gap (see `gap_bars`); dashed, the channel's noise."""
+    """Bars of the held-out RMS residual (see `gap_bars`); dashed, the channel's noise."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -97,11 +99,11 @@ def _gap_panel(axes: Axes, gap: Gap, bars: Bars) -> None:
     axes.set_yticks(range(len(bars)), [bar[0] for bar in bars])
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel(f"rms difference ({unit.name})")
+    axes.set_xlabel(f"RMS residual ({unit.name})")
 
 
 def trace_figure(found: Findings) -> Figure | None:
-    """A stretch of held-out data closely: measured, before and after, and beside it what is left."""
+    """A stretch of held-out data in detail: measurement and models, and their residuals beside it."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -129,7 +131,7 @@ def trace_figure(found: Findings) -> Figure | None:
 
 
 def _closely(left: Axes, right: Axes, series: Compared, rows: slice) -> None:
-    """Measured and models over a stretch, and beside it what is left of both with the noise."""
+    """Measurement and models over a stretch, and beside it both residuals with the noise."""
     time, good = series.time[rows], (series.train | series.hold)[rows]
     measured = series.measured[rows]
     if _is_error(series):
@@ -141,7 +143,7 @@ def _closely(left: Axes, right: Axes, series: Compared, rows: slice) -> None:
     rest_unit = _unit(series, *(series.left[stage][rows] for stage in ("before", "after")))
     for stage, colour in (("before", BEFORE), ("after", AFTER)):
         rest = np.where(good, series.left[stage][rows], np.nan)
-        left.plot(time, unit.factor * (measured - rest), color=colour, linewidth=1.2, label=f"model {stage}")
+        left.plot(time, unit.factor * (measured - rest), color=colour, linewidth=1.2, label=MODELS[stage])
         right.plot(time, rest_unit.factor * rest, color=colour, linewidth=0.9, label=stage)
     right.axhspan(
         *(s * rest_unit.factor * series.noise for s in (-2, 2)),
@@ -149,11 +151,11 @@ def _closely(left: Axes, right: Axes, series: Compared, rows: slice) -> None:
     )  # fmt: skip
     name = "transmission error" if _is_error(series) else spoken(series.channel)
     left.set_title(f"{name} ({unit.name})")
-    right.set_title(f"measured less model ({rest_unit.name})")
+    right.set_title(f"residual ({rest_unit.name})")
 
 
 def whole_figure(found: Findings) -> Figure | None:
-    """What is left of each channel over the whole record, the stretches that no fit has seen shaded."""
+    """Residual of each channel over the whole record, held-out stretches shaded."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -169,12 +171,12 @@ def whole_figure(found: Findings) -> Figure | None:
             unit = _unit(series, *(series.left[stage][good] for stage in ("before", "after")))
             for stage, colour in (("before", BEFORE), ("after", AFTER)):
                 rest = np.where(good, unit.factor * series.left[stage], np.nan)
-                axes.plot(time[::thin], rest[::thin], color=colour, linewidth=0.7, label=stage)
+                axes.plot(time[::thin], rest[::thin], color=colour, linewidth=0.7, label=MODELS[stage])
             for a, b in _runs(series.hold):
                 axes.axvspan(time[a], time[b - 1], color="#EFEFEF", zorder=0)
             axes.set_xlim(time[0], time[-1])
-            axes.set_title(f"{spoken(series.channel)}: measured less model ({unit.name})")
-        _legend(grid[0])
+            axes.set_title(f"{spoken(series.channel)}: residual ({unit.name})")
+        legend_above(grid[0])
         grid[-1].set_xlabel("time (s)")
     return figure
 
@@ -204,11 +206,11 @@ def _runs(flags: Mask, least: int = 20) -> list[tuple[int, int]]:
 
 
 def worst_stretch(time: Array, off: Sequence[Array], hold: Mask) -> slice:
-    """The stretch of held-out samples, short enough to be read, in which the model is farthest off.
+    """The stretch of held-out samples, short enough to be read, with the largest residual.
 
     Args:
         time: shape (n,), s.
-        off: differences of the channels, each over its noise, shape (n,).
+        off: residuals of the channels, each over its noise, shape (n,).
         hold: held-out samples.
     """
     runs = _runs(hold) or [(0, len(time))]
@@ -226,13 +228,13 @@ def worst_stretch(time: Array, off: Sequence[Array], hold: Mask) -> slice:
     return chosen
 
 
-def _legend(axes: Axes) -> None:
+def legend_above(axes: Axes) -> None:
     """A legend above the panel, at its right: it covers no curve and no title."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
 
 
 def curve_figure(curve: CurveFound) -> Figure:
-    """The curve of what has no name, with the 95 % interval of each corner."""
+    """The curve of an unidentified effect, with the 95 % interval of each node."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -260,5 +262,5 @@ def curve_figure(curve: CurveFound) -> Figure:
         axes.axhline(0.0, color="#888888", linewidth=0.8)
         axes.set_xlabel(f"{spoken(curve.coordinate)} ({across.name})")
         axes.set_ylabel(f"{curve.words.partition(' over ')[0]} ({unit.name})")
-        _legend(axes)
+        legend_above(axes)
     return figure

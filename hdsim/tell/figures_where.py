@@ -1,4 +1,4 @@
-"""Where a residual lives, in pictures: shares by coordinate, curves over coordinates, order spectra."""
+"""What a residual depends on, in pictures: shares by regressor, means over regressors, order spectra."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _LOOPS = ("torque", "motor_torque", "output_angle", "temperature")
 SHORT = {
     "wave_generator_angle": "orders of the wave generator",
     "torque": "torque at the output",
-    "frequency": "frequency (something rings)",
+    "frequency": "frequency (vibration)",
 }
 LABELS = {
     "time": ("time", "s"),
@@ -52,7 +52,7 @@ LABELS = {
 
 
 def located_figure(found: Findings) -> Figure | None:
-    """Shares of the re-fitted model's residual by coordinate, curves over the best, and order spectra."""
+    """Shares of the re-fitted model's residual by regressor, means over the best, and order spectra."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -137,13 +137,13 @@ def _shares(axes: Axes, places: Sequence[PlaceEvidence], room: int) -> None:
     axes.set_xlim(0, 112)
     axes.set_xticks([0, 25, 50, 75, 100])
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel("share of what the re-fitted model leaves (%)")
-    axes.set_title("Share by quantity")
+    axes.set_xlabel("share of the re-fitted model's residual (%)")
+    axes.set_title("explained share by regressor")
     axes.set_ylim(max(len(places), room) - 0.4, -0.6)
 
 
 def _over(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) -> None:
-    """The residual over a coordinate: points, and the mean over bins before and after."""
+    """The residual over a regressor: points, and the mean over bins before and after."""
     series = _first(found, place.channel)
     used = np.flatnonzero(series.train)
     values = {stage: rest[used] for stage, rest in series.left.items()}
@@ -160,15 +160,24 @@ def _over(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) -> 
     )
     turned = series.over["direction"][used]
     if place.coordinate in _LOOPS and len(np.unique(turned)) > 1:
-        _mean(axes, x[turned > 0], unit.factor * values["refit"][turned > 0], BEFORE, "left, forwards", "-")
-        _mean(axes, x[turned < 0], unit.factor * values["refit"][turned < 0], BEFORE, "left, backwards", "--")
+        _mean(
+            axes, x[turned > 0], unit.factor * values["refit"][turned > 0], BEFORE, "re-fitted, forwards", "-"
+        )
+        _mean(
+            axes,
+            x[turned < 0],
+            unit.factor * values["refit"][turned < 0],
+            BEFORE,
+            "re-fitted, backwards",
+            "--",
+        )
     else:
-        _mean(axes, x, unit.factor * values["refit"], BEFORE, "left by the re-fitted model")
+        _mean(axes, x, unit.factor * values["refit"], BEFORE, "residual after the re-fit")
     if after:
-        _mean(axes, x, unit.factor * values["after"], AFTER, "left after")
+        _mean(axes, x, unit.factor * values["after"], AFTER, "residual after")
     axes.set_ylim(*_limits(unit.factor * low, unit.factor * high))
     axes.set_xlabel(f"{label} ({name})" if name else label)
-    axes.set_ylabel(f"measured less model ({unit.name})")
+    axes.set_ylabel(f"residual ({unit.name})")
     axes.set_title(
         f"{spoken(place.channel)}: {100 * place.share:.0f} % over "
         f"{SHORT.get(place.coordinate) or spoken(place.coordinate)}"
@@ -216,10 +225,10 @@ def _spectrum(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool)
         sizes[stage] = 2.0 * np.abs(waves @ (values - values.mean())) / len(part)
     unit = _unit(place.channel, float(sizes["refit"].max()))
     axes.plot(
-        orders, unit.factor * sizes["refit"], color=BEFORE, linewidth=1.1, label="left by the re-fitted model"
+        orders, unit.factor * sizes["refit"], color=BEFORE, linewidth=1.1, label="residual after the re-fit"
     )
     if after:
-        axes.plot(orders, unit.factor * sizes["after"], color=AFTER, linewidth=1.1, label="left after")
+        axes.plot(orders, unit.factor * sizes["after"], color=AFTER, linewidth=1.1, label="residual after")
     top = unit.factor * float(sizes["refit"].max())
     for at, text in _peaks(found, lines, highest, own[0].ratio):
         height = unit.factor * float(np.interp(at, orders, sizes["refit"]))
@@ -247,11 +256,9 @@ def _ringing(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) 
         densities[stage] = np.sqrt(power[1:])
     frequency = frequency[1:]
     unit = _unit(place.channel, float(densities["refit"].max()))
-    axes.loglog(
-        frequency, unit.factor * densities["refit"], color=BEFORE, label="left by the re-fitted model"
-    )
+    axes.loglog(frequency, unit.factor * densities["refit"], color=BEFORE, label="residual after the re-fit")
     if after:
-        axes.loglog(frequency, unit.factor * densities["after"], color=AFTER, label="left after")
+        axes.loglog(frequency, unit.factor * densities["after"], color=AFTER, label="residual after")
     k = int(np.argmax(densities["refit"] * np.sqrt(frequency)))
     axes.annotate(f"{frequency[k]:.3g} Hz", (frequency[k], unit.factor * densities["refit"][k]), (0, 3),
                   textcoords="offset points", ha="center", fontsize=8.5, fontweight="bold")  # fmt: skip

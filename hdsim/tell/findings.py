@@ -1,6 +1,6 @@
-"""What there is to tell, as plain data: verdict, evidence, and the compared series that the figures show.
+"""Everything that is reported, as plain data: verdict, evidence, and the compared series of the figures.
 
-All else in `hdsim.tell` reads these; only `gather` walks through a live diagnosis.
+All else in `hdsim.tell` reads these; only `gather` reads a live diagnosis.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Compared:
-    """One predicted channel of one record, and what the models leave of it; arrays of shape (n,), SI units.
+    """One predicted channel of one record with the residuals of the models; arrays of shape (n,), SI units.
 
     Attributes:
         record: number of the record.
@@ -52,11 +52,11 @@ class Compared:
         measured: the channel.
         motor_angle: the motion that was prescribed.
         ratio: motor angle over output angle, signed.
-        train: samples that fits have seen.
-        hold: samples that only the proof has seen.
+        train: samples used by the fits.
+        hold: held-out samples, used by the validation only.
         noise: standard deviation of the channel's noise.
-        left: measured less predicted, by model: ``before``, ``refit``, ``after``.
-        over: coordinates by name; of the first series of each channel only.
+        left: residuals (measured less predicted), by model: ``before``, ``refit``, ``after``.
+        over: regressors by name; of the first series of each channel only.
     """
 
     record: int
@@ -84,7 +84,7 @@ class Compared:
 
 @dataclass(frozen=True)
 class Step:
-    """Held-out gap of a channel with its 95 % interval, SI units, with only some of the named effects."""
+    """Held-out RMS residual of a channel with its 95 % interval, SI units, with only some of the effects."""
 
     effects: tuple[str, ...]
     gap: Mapping[str, tuple[float, tuple[float, float]]]
@@ -92,16 +92,16 @@ class Step:
 
 @dataclass(frozen=True)
 class Findings:
-    """All that is told of a diagnosis.
+    """Everything that is reported of a diagnosis.
 
     Attributes:
         verdict: what was found.
         evidence: what it rests on.
         runs: the measured records.
         series: the compared channels.
-        steps: held-out gaps on the way, where several effects are named.
-        lines: peaks of each channel's order spectrum, of what the re-fitted model leaves.
-        settings: of each named effect, as in a scenario.
+        steps: held-out residuals in between, where several effects are identified.
+        lines: peaks of the order spectrum of each channel's residual, re-fitted model.
+        settings: of each identified effect, as in a scenario.
         turns: longest travel of the wave generator in a record, turns.
     """
 
@@ -126,28 +126,28 @@ class Findings:
 
     @property
     def strongest(self) -> StageEvidence | None:
-        """The pass of the search that began with the most structure."""
+        """The pass of the search that began with the largest systematic residual."""
         return max(self.evidence.stages, key=lambda stage: stage.structured, default=None)
 
     @property
     def places(self) -> list[PlaceEvidence]:
-        """Where the re-fitted model's residual lives, strongest first."""
+        """What the re-fitted model's residual depends on, strongest first."""
         return self.evidence.stages[0].places if self.evidence.stages else []
 
     @property
     def patterned(self) -> bool:
-        """Whether what is left is, beyond chance, a function of some coordinate."""
+        """Whether the residual is, beyond chance, a function of some regressor."""
         evidence = self.evidence
         return evidence.left_chance <= RULES.chance and evidence.left >= RULES.structured
 
     @property
     def once(self) -> Remainder | None:
-        """What is left without a place, where it is no pattern and no curve says it better."""
+        """A residual that depends on no regressor, unless it is a pattern or a curve describes it better."""
         return None if self.patterned or self.verdict.curve is not None else self.verdict.remainder
 
     @property
     def nearest(self) -> tuple[list[str], float]:
-        """Effects that explain most of the structure, and how much of it; without a fitted one none and 0."""
+        """Effects that explain most of the systematic residual, and their share; none and 0 without a fit."""
         laws = self.evidence.laws
         if laws:
             return [law.name for law in laws], self.evidence.explained
@@ -157,13 +157,13 @@ class Findings:
 
     @property
     def pattern_chance(self) -> float:
-        """Least probability that what was seen, or what the search has found, is there by chance."""
+        """Smallest p-value of what was observed, or of what the search has found."""
         chances = [stage.structured_chance for stage in self.evidence.stages]
         return min([*chances, *(law.chance for law in self.evidence.laws)], default=1.0)
 
     @property
     def not_believed(self) -> list[LawEvidence]:
-        """Effects that the search has added and that have no name beside the named ones."""
+        """Effects that the search has added and that are not identified, beside the identified ones."""
         named = Counter(effect.name for effect in self.verdict.effects)
         found = []
         for law in self.evidence.laws if named else ():
@@ -175,9 +175,9 @@ class Findings:
 
     @property
     def unexplained(self) -> float:
-        """Part of all structure that the named effects leave; 0 where none is named.
+        """Share of the systematic residual that the identified effects do not explain; 0 without one.
 
-        The evidence counts all that the search has added: what only the others explain is left, too.
+        The evidence counts all that the search has added: what only the others explain is unexplained, too.
         """
         if not (self.verdict.effects and self.evidence.laws):
             return 0.0
@@ -185,7 +185,7 @@ class Findings:
 
     @property
     def other_shape(self) -> tuple[float, PlaceEvidence] | None:
-        """That part and where it lives, where it is no chance; None else."""
+        """That share and its regressor, where it is significant; None else."""
         places = self.evidence.stages[-1].places if self.evidence.stages else []
         left = 1.0 - self.evidence.explained
         real = self.evidence.left_chance <= RULES.chance and left >= LEAST_REST and self.unexplained > 0.0
@@ -193,9 +193,9 @@ class Findings:
 
     @property
     def left_most(self) -> tuple[str, float]:
-        """The channel that is left with most, and how much in units of its noise; 0 where unknown.
+        """The channel with the largest residual relative to its noise, and that ratio; 0 where unknown.
 
-        Where the search has added more than is named it is the gap of the named effects alone.
+        Where the search has added more than is identified it is the residual of the identified effects alone.
         """
         rest = self.evidence.rest
         if self.not_believed and self.verdict.gap:
@@ -209,7 +209,7 @@ class Findings:
 
 
 def gather(diagnosis: Diagnosis) -> Findings:
-    """What there is to tell of a diagnosis."""
+    """What is to be reported of a diagnosis."""
     bench, verdict = diagnosis.bench, diagnosis.verdict
     left = {stage: bench.residuals(found, drift=True) for stage, found in diagnosis.predictions.items()}
     series = []
@@ -253,7 +253,7 @@ def gather(diagnosis: Diagnosis) -> Findings:
 
 
 def _steps(diagnosis: Diagnosis) -> tuple[Step, ...]:
-    """Gaps of the models with the first of several named effects; none that the verdict does not name."""
+    """Residuals of the models with the first of several identified effects."""
     bench, names = diagnosis.bench, {effect.name for effect in diagnosis.verdict.effects}
     found = []
     for stage in diagnosis.stages:

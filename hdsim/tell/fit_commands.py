@@ -16,10 +16,12 @@ if TYPE_CHECKING:
 @click.command()
 @measured_options
 @click.option(
-    "--free", multiple=True, metavar="PATH", help="A number that moves; without it all declared ones."
+    "--free", multiple=True, metavar="PATH", help="A parameter to be estimated; without it all declared ones."
 )
-@click.option("--fix", multiple=True, metavar="PATH", help="A number that does not move.")
-@click.option("--apart", multiple=True, metavar="PATH", help="A number of a group that moves by itself.")
+@click.option("--fix", multiple=True, metavar="PATH", help="A parameter that stays fixed.")
+@click.option(
+    "--apart", multiple=True, metavar="PATH", help="A parameter of a group that is estimated by itself."
+)
 def fit(
     measured: tuple[Path, ...],
     model: Path,
@@ -34,11 +36,11 @@ def fit(
     force: bool,
     black_box: bool,
 ) -> int:
-    """Fit a scenario's numbers to measured records.
+    """Estimate a scenario's parameters from measured records.
 
-    Gives every number with its 95 % interval, or says what it cannot be told from; numbers are shared by all
-    records, and so are the zeros of torque sensors (--zeros). PATH is a number's place in the scenario, such
-    as drive.friction.coulomb_nm.
+    Gives every parameter with its 95 % confidence interval, or the parameters that it is confounded with.
+    All records share the parameters, and the zeros of torque sensors (--zeros). PATH is a parameter's place
+    in the scenario, such as drive.friction.coulomb_nm.
     """
     import hdsim
     from hdsim.estimate.outcome import result_of
@@ -60,7 +62,7 @@ def fit(
 
 
 def _show(result: FitResult) -> None:
-    """Print the numbers, the gaps and what needs attention."""
+    """Print the estimates, the held-out residuals and what needs attention."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -73,23 +75,25 @@ def _show(result: FitResult) -> None:
     out = console()
     out.print(Text(summary(result)), highlight=False)
     numbers = Table(box=SIMPLE_HEAD)
-    for k, name in enumerate(("number", "unit", "model", "fitted", "95 % interval")):
+    for k, name in enumerate(("parameter", "unit", "model", "estimate", "95 % interval")):
         numbers.add_column(name, justify="right" if k in (2, 3) else "left")
     for path, number in result.numbers.items():
         if number.interval is not None:
             told = f"{shown(number.interval[0])} to {shown(number.interval[1])}"
-            told += " (its prior's)" if number.tied_to else ""
+            told += " (from the prior)" if number.tied_to else ""
         else:
-            told = "not determined"
+            told = "not identifiable"
             told += (
-                f", tied to {', '.join(named_number(n)[0] for n in number.tied_to)}" if number.tied_to else ""
+                f", confounded with {'; '.join(named_number(n)[0] for n in number.tied_to)}"
+                if number.tied_to
+                else ""
             )
         words, unit = named_number(path)
         start = "" if number.start is None else shown(number.start)
         style = "bold" if path in result.moved else ""
         numbers.add_row(words, unit, start, shown(number.value), told, style=style)
     out.print(numbers)
-    gaps = Table(box=SIMPLE_HEAD, title="RMS difference on held-out data", title_justify="left")
+    gaps = Table(box=SIMPLE_HEAD, title="RMS residual on held-out data", title_justify="left")
     for name in GAP_HEAD:
         gaps.add_column(name, justify="left" if name in GAP_HEAD[:2] else "right")
     for row in gap_rows(result):

@@ -1,4 +1,4 @@
-"""Figures of a fit: intervals, correlations, what the data see, and what is left of each channel."""
+"""Figures of a fit: confidence intervals, correlations of the estimates, residuals of the channels."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from hdsim.estimate.estimation import Estimation
 from hdsim.plot import style, units
-from hdsim.tell.figures import AFTER, BEFORE, POINTS, WIDTH
+from hdsim.tell.figures import AFTER, BEFORE, MODELS, POINTS, WIDTH, legend_above
 from hdsim.tell.words import named_number, spoken
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def intervals_figure(found: Estimation) -> Figure | None:
-    """Each determined number over the model's, with its 95 % interval."""
+    """Each identifiable parameter over the model's value, with its 95 % interval."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -34,15 +34,17 @@ def intervals_figure(found: Estimation) -> Figure | None:
         values = np.array([[i.low / i.start, i.high / i.start] for i in shown])
         if values.max() / values.min() > 4.0:
             axes.set_xscale("log")
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_formatter("{x:g}")
         axes.set_yticks(range(len(shown)), [named_number(i.name)[0] for i in shown])
         axes.set_ylim(len(shown) - 0.5, -0.5)
         axes.grid(visible=False, axis="y")
-        axes.set_xlabel("fitted value over the model's (95 % interval; orange: the model's lies outside)")
+        axes.set_xlabel("estimate / model value (95 % interval; orange: model value outside)")
     return figure
 
 
 def correlation_figure(found: Estimation) -> Figure | None:
-    """The correlation matrix of the fitted numbers."""
+    """The correlation matrix of the estimates."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -67,7 +69,7 @@ def correlation_figure(found: Estimation) -> Figure | None:
 
 
 def left_figure(found: Estimation) -> Figure | None:
-    """What the model as given and as fitted leave of each channel of the first held-out record."""
+    """Residuals of the model as given and as fitted, of each channel of the first held-out record."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -93,13 +95,13 @@ def left_figure(found: Estimation) -> Figure | None:
             unit = units.for_error(size) if channel.endswith("angle") else units.for_torque(size)
             for stage, colour in (("before", BEFORE), ("after", AFTER)):
                 rest = np.where(good, unit.factor * residuals[stage][k], np.nan)
-                axes.plot(record.time[::thin], rest[::thin], color=colour, linewidth=0.8, label=stage)
+                axes.plot(record.time[::thin], rest[::thin], color=colour, linewidth=0.8, label=MODELS[stage])
             axes.fill_between(
                 record.time, 0, 1, where=series.hold, transform=axes.get_xaxis_transform(),
                 color="#EFEFEF", zorder=0, linewidth=0,
             )  # fmt: skip
             axes.set_xlim(record.time[0], record.time[-1])
-            axes.set_title(f"{spoken(channel)}: measured less model ({unit.name}), {record.name}")
-        grid[0].legend(loc="upper right", ncols=2)
+            axes.set_title(f"{spoken(channel)}: residual ({unit.name}), {record.name}")
+        legend_above(grid[0])
         grid[-1].set_xlabel("time (s)")
     return figure

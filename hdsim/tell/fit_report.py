@@ -27,15 +27,14 @@ if TYPE_CHECKING:
 DPI = 160
 GAP_HEAD = ("channel", "unit", "before", "after", "noise", "after/before", "after/noise")
 _CAPTIONS = {
-    "intervals": "Intervals come from the spread over blocks of time left out one after another, not from "
-    "the noise alone.",
-    "correlation": "Near 1 or -1 only a combination of the two numbers is known well.",
-    "left": "Shaded: held out, the fit has not seen it. Sensors' offsets are taken out.",
+    "intervals": "Confidence intervals by the jackknife over blocks of time, valid for correlated residuals.",
+    "correlation": "Near 1 or −1 only a combination of the two parameters is well determined.",
+    "left": "Residual: measurement minus prediction, sensor offsets removed. Shaded: held-out data.",
 }
 
 
 def gap_rows(result: FitResult) -> list[list[str]]:
-    """Rows of the table of held-out gaps; the columns are ``GAP_HEAD``."""
+    """Rows of the table of held-out residuals; the columns are ``GAP_HEAD``."""
     rows = []
     for channel, gap in result.gap.items():
         unit = unit_of(gap)
@@ -49,12 +48,12 @@ def gap_rows(result: FitResult) -> list[list[str]]:
 def summary(result: FitResult) -> str:
     """The fit in a sentence."""
     known = [n for n in result.numbers.values() if n.left is not None and n.left <= UNDETERMINED]
-    said = f"{len(known)} of {len(result.numbers)} numbers are determined by these data"
+    said = f"{len(known)} of {len(result.numbers)} parameters are identifiable from these data"
     if result.moved:
-        said += f"; {len(result.moved)} differ from the model's: "
+        said += f"; {len(result.moved)} {'differs' if len(result.moved) == 1 else 'differ'} from the model: "
         said += ", ".join(_change(result, name) for name in result.moved)
     else:
-        said += "; none differs from the model's by more than its interval"
+        said += "; for none does the 95 % interval exclude the model's value"
     return f"{said}."
 
 
@@ -121,15 +120,14 @@ def page(found: Estimation, result: FitResult, pictures: dict[str, str]) -> str:
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",
-        f"<title>Fitted numbers: hdsim fit</title><style>{css}:root{{--kind:var(--parameter)}}</style>",
+        f"<title>Parameter estimates: hdsim fit</title><style>{css}:root{{--kind:var(--parameter)}}</style>",
         f"</head><body><main><p class='origin'>{html.escape(_origin(found))}</p>",
-        f"<header class='verdict'><p class='kind'>Fitted numbers</p><h1 class='long'>{said}</h1></header>",
-        _section("The numbers", numbers + pictures.get("intervals", "")),
-        _section(
-            "How far off the model is on data that the fit has not seen", gaps + pictures.get("left", "")
-        ),
-        _section("What these data tell", _identifiable(found) + pictures.get("correlation", "")),
-        _section("What belongs to one record", _records(found)),
+        "<header class='verdict'><p class='kind'>Parameter estimates</p><h1 "
+        f"class='long'>{said}</h1></header>",
+        _section("Parameters", numbers + pictures.get("intervals", "")),
+        _section("Validation: RMS residual on held-out data", gaps + pictures.get("left", "")),
+        _section("Identifiability", _identifiable(found) + pictures.get("correlation", "")),
+        _section("Offsets of each record", _records(found)),
         _section("Problems in the data", _problems(result)) if result.data_problems else "",
         _section("Files", _files(result)),
         "</main></body></html>",
@@ -152,7 +150,7 @@ def _origin(found: Estimation) -> str:
 
 
 def _identifiable(found: Estimation) -> str:
-    """The directions that the data see or not, and the pairs that only a combination of is known."""
+    """The combinations that the data determine or not, and the groups that are strongly correlated."""
     rows = []
     for direction in found.directions:
         parts = sorted(direction.parts.items(), key=lambda part: -abs(part[1]))
@@ -162,21 +160,22 @@ def _identifiable(found: Estimation) -> str:
         )
     seen = sum(direction.seen for direction in found.directions)
     body = (
-        f"<p>The data see {seen} of {len(found.directions)} combinations of the numbers (logarithms, in "
-        "units of what was believed of each before).</p>"
-        + table(("combination", "left of its prior spread", "determined"), rows, (1,))
+        f"<p>The data determine {seen} of {len(found.directions)} combinations of the parameters "
+        "(logarithms, in "
+        "units of the prior standard deviations).</p>"
+        + table(("combination", "posterior / prior spread", "identifiable"), rows, (1,))
     )
     groups = tied_groups(found.names, found.correlation)
     if groups:
         listed = "".join(
             f"<li>{html.escape('; '.join(named_number(name)[0] for name in group))}</li>" for group in groups
         )
-        body += f"<p>Known well only relative to one another:</p><ul>{listed}</ul>"
+        body += f"<p>Strongly correlated; only a combination is well determined:</p><ul>{listed}</ul>"
     return body
 
 
 def _records(found: Estimation) -> str:
-    """Offsets and locked zeros."""
+    """Offsets, and zeros of a locked drive."""
     channels = list(found.bench.channels)
     sizes = {c: max((abs(r.offsets.get(c, 0.0)) for r in found.readings), default=0.0) for c in channels}
     angle = [channel.endswith("angle") for channel in channels]
@@ -195,19 +194,20 @@ def _records(found: Estimation) -> str:
             cells.append("-" if reading.zero is None else f"{units.DEGREE.factor * reading.zero:.3g}")
         rows.append(cells)
     head = ["record", *(f"{spoken(c)} ({u.name})" for c, u in zip(channels, shown_in, strict=True))]
-    head += ["locked zero (deg)"] if locked else []
-    note = "<p class='note'>Sensors' offsets: measured less predicted, mean.</p>"
+    head += ["zero when locked (deg)"] if locked else []
+    note = "<p class='note'>Sensor offset: mean of measurement minus prediction.</p>"
     return table(head, rows, range(1, len(head))) + note
 
 
 def _problems(result: FitResult) -> str:
     rows = [[p.severity, p.record, spoken(p.channel), p.message] for p in result.data_problems]
-    return table(("", "record", "channel", "what was found"), rows)
+    return table(("severity", "record", "channel", "finding"), rows)
 
 
 def _files(result: FitResult) -> str:
     name = html.escape(result.scenario)
     return (
-        "<p><code>fit.json</code>: all of it as data. <code>fitted.yaml</code>: the scenario with the fitted "
-        f"numbers, extends yours.</p><pre>hdsim run {name}</pre>"
+        "<p><code>fit.json</code>: all results as data. <code>fitted.yaml</code>: the scenario with the "
+        "estimates; "
+        f"it extends yours.</p><pre>hdsim run {name}</pre>"
     )

@@ -1,4 +1,4 @@
-"""Measured, before and after side by side, as a recording that a viewer opens."""
+"""Measurement and models side by side, as a recording that a viewer opens."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 LOG, LAYOUT = "compared.mcap", "diagnose.json"
 _SHORT = {
     "nothing": "nothing is missing",
-    "parameter": "a number of the model is off",
+    "parameter": "a parameter of the model is wrong",
     "effect": "an effect is missing",
-    "unknown": "something is missing",
+    "unknown": "an unidentified effect",
 }
 
 
@@ -46,7 +46,7 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
     Angles and torques are in SI units; the models' offsets against the sensors are removed, as in the fits.
     Where the output's angle is predicted, ``transmission_error`` is it less the motor's angle over the ratio.
     The columns ``..._error`` of a model are measured less predicted, NaN where the measurement is not
-    to be trusted. The verdict, and each effect that was named, are events at the beginning.
+    to be trusted. The verdict, and each identified effect, are events at the beginning.
     """
     from hdsim.log.facts import KEY
 
@@ -78,7 +78,8 @@ def side_by_side(diagnosis: Diagnosis) -> Recording:
     start = float(time[0])
     told = [Event(start, "info", "verdict", verdict.sentence)]
     for effect in verdict.effects:
-        share = f"{100 * effect.explained:.2g} % of what was left, {100 * effect.confidence:.2g} % sure"
+        explained, probability = 100 * effect.explained, 100 * effect.confidence
+        share = f"{explained:.2g} % of the residual explained, probability {probability:.2g} %"
         told.append(Event(start, "info", "effect", f"{effect.name} ({effect.title}): {share}"))
     names = ", ".join(effect.title or effect.name for effect in verdict.effects)
     return Recording(

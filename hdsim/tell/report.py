@@ -29,26 +29,25 @@ DPI = 160
 LONG = 150
 
 _CAPTIONS = {
-    "gap": "Root-mean-square difference between measurement and model on data that no fit has seen, in the "
-    "unit of each channel (in brackets: as a share of the model as given). Whiskers: 95 % intervals over "
-    "blocks of time. Dashed line: noise of the sensor, as neighbouring readings differ by it. It is a mark "
-    "and no bound: errors that last over many readings are larger, and a model may foretell a part of them.",
-    "located": "How much of what the re-fitted model leaves is a function of one quantity, checked on "
-    "blocks of time left out of the fit; the shares of related quantities overlap. Grey: measured samples. "
-    "Orange: what the re-fitted model leaves. Green: what is left with what was found.",
-    "traces": "The stretch of held-out data in which the model as given is farthest off. Grey band: "
-    "twice the sensor's noise to either side; what stays inside may be noise. Sensors' offsets are taken "
-    "out.",
-    "whole": "The same difference over the whole record. Shaded: held out, no fit has seen it.",
-    "curve": "The curve with the 95 % interval of each corner. What the model's own numbers "
-    "could explain as well, such as a constant, is left out.",
+    "gap": "Root-mean-square residual (measurement minus model) on held-out data, which no fit has used (in "
+    "brackets: relative to the model as given). Whiskers: 95 % confidence intervals over blocks of time. "
+    "Dashed: noise floor of the sensor, estimated from neighbouring readings. It is a reference, not a lower "
+    "bound: slowly varying errors exceed it, and a model may predict a part of them.",
+    "located": "Share of the re-fitted model's residual that is a function of a single regressor, "
+    "cross-validated over blocks of time; the shares of correlated regressors overlap. Grey: samples. "
+    "Orange: residual of the re-fitted model. Green: residual of the final model.",
+    "traces": "The stretch of held-out data in which the model as given has its largest residual. Grey band: "
+    "plus and minus two standard deviations of the noise. Sensor offsets are removed.",
+    "whole": "The residual over the whole record. Shaded: held-out data, used by no fit.",
+    "curve": "The curve with the 95 % confidence interval of each node. What the parameters of the model "
+    "explain equally well, such as a constant, is not part of it.",
 }
 _ALTS = {
-    "gap": "bar chart of the gap of each channel",
-    "located": "where the difference lives",
-    "traces": "measured, model before and model after over time",
-    "whole": "what is left over the whole record",
-    "curve": "the curve found",
+    "gap": "bar chart of the RMS residual of each channel",
+    "located": "residual over its regressors",
+    "traces": "measurement and model before and after over time",
+    "whole": "residual over the whole record",
+    "curve": "estimated curve",
 }
 
 
@@ -94,8 +93,8 @@ def _page(found: Findings, pictures: dict[str, str]) -> str:
         _origin(found),
         _head(found),
         section(
-            "How far off the model is, before and after",
-            pictures.get("gap", "<p>No data were held out, so there is no gap to show.</p>")
+            "RMS residual on held-out data",
+            pictures.get("gap", "<p>No data were held out, so there is no validation.</p>")
             + _beside(verdict)
             + (_as_numbers(verdict) if verdict.gap else ""),
         ),
@@ -104,9 +103,9 @@ def _page(found: Findings, pictures: dict[str, str]) -> str:
         sections.following(verdict),
         sections.curve(found, pictures.get("curve", "")),
         section(
-            "Where the difference lives",
+            "What the residual depends on",
             pictures.get(
-                "located", "<p>What the re-fitted model leaves is a function of nothing measured.</p>"
+                "located", "<p>The residual of the re-fitted model depends on nothing that was measured.</p>"
             ),
         ),
         _over_time(pictures),
@@ -121,17 +120,17 @@ def _page(found: Findings, pictures: dict[str, str]) -> str:
 
 def _beside(verdict: Verdict) -> str:
     listed = "".join(f"<li>{html.escape(line)}</li>" for line in baselines(verdict.gap, last_model(verdict)))
-    return f"<p>How much of it can be learnt from the same samples:</p><ul>{listed}</ul>" if listed else ""
+    return f"<p>Baselines, fitted to the same samples:</p><ul>{listed}</ul>" if listed else ""
 
 
 def _as_numbers(verdict: Verdict) -> str:
     rows = table(GAP_HEAD, gap_rows(verdict), range(2, len(GAP_HEAD)))
-    return f"<details><summary>the same as numbers</summary>{rows}</details>"
+    return f"<details><summary>table</summary>{rows}</details>"
 
 
 def _over_time(pictures: dict[str, str]) -> str:
     body = pictures.get("traces", "") + pictures.get("whole", "")
-    return section("Measured, and the model before and after", body) if body else ""
+    return section("Measurement and model over time", body) if body else ""
 
 
 def _origin(found: Findings) -> str:
@@ -151,17 +150,16 @@ def _head(found: Findings) -> str:
     said = headline(found)
     long = " class='long'" if len(said) > LONG else ""
     listed = "".join(f"<li>{html.escape(line)}</li>" for line in gains(verdict))
-    unseen = "Gap on data that no fit has seen:" if verdict.gap else "No data were held out."
+    unseen = "RMS residual on held-out data:" if verdict.gap else "No data were held out."
     return (
         "<header class='verdict'><p "
         f"class='kind'>{KINDS[verdict.verdict]}</p><h1{long}>{html.escape(said)}</h1><div "
-        f"class='facts'><div><h2>How sure</h2><p class='big'>{html.escape(sure.words)}: <span "
+        f"class='facts'><div><h2>Confidence</h2><p class='big'>{html.escape(sure.words)}: <span "
         f"class='number'>{html.escape(sure.number)}</span></p>"
         + (f"<p class='left'>But {html.escape(sure.left)}.</p>" if sure.left else "")
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)
-        + f"</div><div><h2>What it "
-        f"means</h2><p>{html.escape(meaning(found))}</p>{_pointers(verdict)}</div><div><h2>What it "
-        f"gains</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
+        + f"</div><div><h2>What it means</h2><p>{html.escape(meaning(found))}</p>{_pointers(verdict)}</div>"
+        f"<div><h2>Validation</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
     )
 
 

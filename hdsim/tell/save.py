@@ -1,4 +1,4 @@
-"""Write what a diagnosis found."""
+"""Write the results of a diagnosis."""
 
 from __future__ import annotations
 

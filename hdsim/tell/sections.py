@@ -17,7 +17,7 @@ from hdsim.tell.words import percent, short, shown, spoken, started, titles_of
 
 
 def confusions(verdict: Verdict) -> str:
-    """What the data cannot tell from the names, and effects that explain a part."""
+    """Effects that the data cannot distinguish from the identified ones, and effects that explain a part."""
     body = ""
     for effect in verdict.effects:
         if not effect.indistinguishable_from:
@@ -25,13 +25,14 @@ def confusions(verdict: Verdict) -> str:
         own, *others = titles_of(effect)
         lines = ""
         for name, title in zip(effect.indistinguishable_from, others, strict=True):
-            rule = effect.separated_by.get(name) or "no rule is recorded"
-            lines += f"<li><b>{html.escape(title)}</b>. What separates the two: {html.escape(rule)}.</li>"
-        body += f"<p>These data cannot tell <b>{html.escape(own)}</b> from:</p><ul>{lines}</ul>"
+            rule = effect.separated_by.get(name) or "not recorded"
+            lines += f"<li><b>{html.escape(title)}</b>. How they differ: {html.escape(rule)}.</li>"
+        body += f"<p>These data cannot distinguish <b>{html.escape(own)}</b> from:</p><ul>{lines}</ul>"
     if verdict.suspects:
         listed = ", ".join(f"{spoken(name)} ({percent(share)})" for name, share in verdict.suspects.items())
-        body += f"<p>Effects that explain a part, not enough to be named: {html.escape(listed)}.</p>"
-    return section("Could be confused", body, "warn") if body else ""
+        said = "Effects that explain a part of the residual, too little to be identified"
+        body += f"<p>{said}: {html.escape(listed)}.</p>"
+    return section("Alternatives", body, "warn") if body else ""
 
 
 def following(verdict: Verdict) -> str:
@@ -47,17 +48,17 @@ def following(verdict: Verdict) -> str:
     if proposal.scenario:
         body += (
             f"<p>It is ready as a scenario: <code>{html.escape(Path(proposal.scenario).name)}</code>; "
-            f"<code>hdsim run {html.escape(proposal.scenario)}</code> shows what the model expects.</p>"
+            f"<code>hdsim run {html.escape(proposal.scenario)}</code> shows what the model predicts.</p>"
         )
     body += (
-        "<p class='note'>d′ is the distance between the two candidates that are hardest to tell apart, in "
-        "standard deviations of the noise, after each has been fitted to the other as well as it can be: 1 "
-        "is a guess that is right in 69 % of cases, 3 in 93 %, more is safe. Here "
-        f"{_few(proposal.separation)} is expected, which is right in {percent(proposal.correct)} of cases "
-        "if the noise is all that is unknown.</p>"
+        "<p class='note'>Discriminability d′: distance between the two candidates that are hardest to "
+        "distinguish, in standard deviations of the noise, after each has been fitted to the other. With "
+        "d′ = 1 the better fit is the right one in 69 % of cases, with 3 in 93 %. Here "
+        f"{_few(proposal.separation)} is expected, {percent(proposal.correct)} of cases, if the noise is the "
+        "only unknown.</p>"
     )
-    head = ("experiment", "expected d′", "against repeating the record")
-    return f"<section id='next'><h2>What to measure next</h2>{body}{table(head, rows, (1, 2))}</section>"
+    head = ("experiment", "expected d′", "relative to repeating the record")
+    return f"<section id='next'><h2>Next experiment</h2>{body}{table(head, rows, (1, 2))}</section>"
 
 
 def _few(value: float) -> str:
@@ -65,7 +66,7 @@ def _few(value: float) -> str:
 
 
 def curve(found: Findings, picture: str) -> str:
-    """What has no name as a curve: all of it, or what the names leave."""
+    """The unidentified part as a curve: the residual, or what identified effects do not explain of it."""
     curve = found.verdict.curve
     if curve is None:
         return ""
@@ -78,40 +79,39 @@ def curve(found: Findings, picture: str) -> str:
         f"{words} ({percent(share)})" for words, share in curve.tried.items() if words != curve.words
     )
     named = found.verdict.verdict == "effect"
-    checked = (
-        f"{percent(curve.share)} of what the model leaves (checked on blocks of time left out of the fit)"
-    )
+    checked = f"{percent(curve.share)} of the model's residual (cross-validated over blocks of time)"
     what = f"<b>{html.escape(started(curve.words))}</b>"
     if named:
-        part = "A part of it"
+        part = "A part of the residual"
         if found.unexplained > 0:
-            part = f"{percent(found.unexplained)} of it (of the structure that the re-fitted model left)"
-        body = f"<p>{part} follows another shape than the named law. {what} explains {checked}. The curve is "
-        body += "shown only: found.yaml holds the named effects without it.</p>"
+            part = f"{percent(found.unexplained)} of the systematic residual of the re-fitted model"
+        body = f"<p>{part} does not follow the equation of the identified effect. {what} explains {checked}. "
+        body += "The curve is not part of found.yaml, which holds the identified effects alone.</p>"
     else:
         body = f"<p>{what} explains {checked}.</p>"
     body += (
         picture
-        + (f"<p class='note'>Other curves that were tried: {html.escape(others)}.</p>" if others else "")
-        + f"<details><summary>its corners as numbers</summary>{table(head, rows, (0, 1, 2))}</details>"
+        + (f"<p class='note'>Other curves tested: {html.escape(others)}.</p>" if others else "")
+        + f"<details><summary>table of the nodes</summary>{table(head, rows, (0, 1, 2))}</details>"
     )
-    title = "What the named effects leave" if named else "The curve that is missing"
+    title = "Residual of the identified effects" if named else "The unidentified effect as a curve"
     return f"<section id='curve'><h2>{title}</h2>{body}</section>"
 
 
 def fitted(found: Findings) -> str:
-    """Fitted numbers of the named effects and of the model."""
+    """Parameter estimates of the identified effects and of the model."""
     verdict, body = found.verdict, ""
     for effect, own in zip_longest(verdict.effects, found.settings[: len(verdict.effects)]):
         body += f"<h3>{html.escape(started(effect.title or spoken(effect.name)))} (new)</h3>"
         body += numbers_table(effect.parameters, settings=own)
     if verdict.parameters:
-        body += "<h3>The model's own numbers</h3>" + numbers_table(verdict.parameters, verdict.moved)
+        body += "<h3>Parameters of the model</h3>" + numbers_table(verdict.parameters, verdict.moved)
         body += (
-            "<p class='note'>Marked at the left: the model's number lies outside the interval. Intervals "
-            "come from the spread over blocks of time, not from the noise alone.</p>"
+            "<p class='note'>Marked rows: the interval excludes the model's value. Confidence intervals by "
+            "the "
+            "jackknife over blocks of time, valid for correlated residuals.</p>"
         )
-    return section("Fitted numbers", body) if body else ""
+    return section("Parameter estimates", body) if body else ""
 
 
 def data(verdict: Verdict) -> str:
@@ -124,7 +124,7 @@ def data(verdict: Verdict) -> str:
         + "</tr>"
         for p in verdict.data_problems
     )
-    head = "".join(f"<th>{h}</th>" for h in ("", "record", "channel", "kind", "what was found"))
+    head = "".join(f"<th>{h}</th>" for h in ("severity", "record", "channel", "kind", "finding"))
     return (
         "<section id='data'><h2>Problems in the data</h2><div "
         f"class='wide'><table><tr>{head}</tr>{lines}</table></div></section>"
@@ -132,60 +132,63 @@ def data(verdict: Verdict) -> str:
 
 
 def not_tried(verdict: Verdict) -> str:
-    """Effects that could not be tried, by reason."""
+    """Effects that could not be tested, by reason."""
     if not verdict.not_tried:
         return ""
     reasons: dict[str, list[str]] = {}
     for name, why in verdict.not_tried.items():
         reasons.setdefault(why, []).append(spoken(name))
     rows = [[", ".join(names), why] for why, names in reasons.items()]
-    return section("Effects that were not tried", table(("effects", "why"), rows))
+    return section("Effects not tested", table(("effects", "reason"), rows))
 
 
 def method(found: Findings) -> str:
     """How a diagnosis works, in five steps."""
     held = any(run.held for run in found.runs)
-    proof = "the records given for it" if held else "every third stretch of each record"
+    proof = "separate records" if held else "every third stretch of each record"
     steps = (
         "The measured motion is prescribed to the model, which predicts the other channels; controllers "
         "and commands play no part.",
-        "The model's own numbers are fitted first, so that nothing is called missing that a better number "
-        "explains.",
-        "What is left is looked for over time, speed, direction, angle, torque and temperature, and in "
-        "orders of the wave generator's turn.",
-        "Every effect of the catalogue is simulated in the re-fitted model. Its trace must explain blocks "
-        f"of time that it has not seen: at least {percent(LEAST_SHARE)} of what is left, and more than the "
-        f"same search finds in all but {percent(LEVEL)} of 400 residuals with signs turned at random. The "
+        "The parameters of the model are re-estimated first, so that no effect is reported where a better "
+        "parameter value explains the residual.",
+        "The residual is regressed on time, speed, direction, angle, torque and temperature, and on the "
+        "orders of the wave generator's rotation.",
+        "Every effect of the catalogue is simulated in the re-fitted model. Its predicted change must "
+        "explain "
+        f"left-out blocks of time: at least {percent(LEAST_SHARE)} of the residual, and more than the same "
+        f"search finds in all but {percent(LEVEL)} of 400 residuals with random signs (wild bootstrap). The "
         "best are fitted in full.",
-        "All of it is evidence. Each piece makes a name more or less likely; the odds multiply to the "
-        f"probability that the name is right, and a name is given from {percent(RULES.believed)} on (see Why "
-        f"this verdict). The gap is computed on {proof}.",
+        "Each piece of evidence multiplies the odds of an effect; the posterior probability is that the "
+        "effect "
+        f"is the right one, and it is identified from {percent(RULES.believed)} on (see Why this verdict). "
+        f"Validation uses {proof}.",
     )
     listed = "".join(f"<li>{html.escape(step)}</li>" for step in steps)
     spent = sum(found.verdict.seconds.values())
-    time = f"<p class='note'>It took {spent:.0f} s.</p>" if spent else ""
-    return section("How it was decided", f"<ol>{listed}</ol>{time}")
+    time = f"<p class='note'>Processor time: {spent:.0f} s.</p>" if spent else ""
+    return section("Method", f"<ol>{listed}</ol>{time}")
 
 
 def written(verdict: Verdict, pictures: Collection[str]) -> str:
     """The files beside the page."""
     rows = [
         ["report.html", "this page"],
-        ["verdict.json", "all of it as data"],
+        ["verdict.json", "all results as data"],
         [
             "compared.mcap",
-            "measured, before, re-fit and after over the same times, for Foxglove or Lichtblick",
+            "measurement and the models before, re-fitted and after, over the same times, for Foxglove or "
+            "Lichtblick",
         ],
-        ["diagnose.json", "the layout for it: import it in the viewer"],
+        ["diagnose.json", "its layout for the viewer"],
         [", ".join(f"{name}.png" for name in pictures), "the figures"],
     ]
     commands = ""
     if verdict.scenario:
-        what = "the curve as a table effect" if verdict.verdict == "unknown" else "what was found"
-        rows.insert(2, [Path(verdict.scenario).name, f"the model with {what}: extends your scenario"])
-        commands += f"hdsim run {verdict.scenario}    # the model with what was found\n"
+        what = "the curve as a table effect" if verdict.verdict == "unknown" else "the result"
+        rows.insert(2, [Path(verdict.scenario).name, f"the model with {what}; extends your scenario"])
+        commands += f"hdsim run {verdict.scenario}    # the model with the result\n"
     if verdict.next_experiment is not None and verdict.next_experiment.scenario:
         rows.insert(3, [Path(verdict.next_experiment.scenario).name, "the next experiment"])
         commands += f"hdsim run {verdict.next_experiment.scenario}    # the next experiment\n"
     pre = f"<pre>{html.escape(commands.rstrip())}</pre>" if commands else ""
-    return section("Files, and what to do with them", table(("file", "what it is"), rows) + pre)
+    return section("Files", table(("file", "content"), rows) + pre)

@@ -12,12 +12,12 @@ from hdsim.estimate.found import FittedNumber
 from hdsim.tell.words import named_number, short, shown, spoken, unit_of
 
 GAP_HEAD = ("channel", "unit", "before", "re-fit", "after", "noise", "after/before", "after/noise")
-#: An interval that is wider than this many times its number does not tell it.
+#: An interval wider than this many times its estimate is called poorly determined.
 WIDE = 1.0
 
 
 def gap_rows(verdict: Verdict) -> list[list[str]]:
-    """Rows of the gap table in readable units; the columns are ``GAP_HEAD``."""
+    """Rows of the table of held-out residuals in readable units; the columns are ``GAP_HEAD``."""
     rows = []
     for channel, gap in verdict.gap.items():
         unit = unit_of(gap)
@@ -60,17 +60,22 @@ def section(title: str, body: str, kind: str = "") -> str:
 def numbers_table(
     numbers: Mapping[str, FittedNumber], moved: Sequence[str] = (), settings: Mapping[str, Any] | None = None
 ) -> str:
-    """Fitted numbers with their intervals and how far they moved; those in ``moved`` are marked.
+    """Parameter estimates with their intervals and changes; those in ``moved`` are marked.
 
     Args:
         numbers: by path.
-        moved: paths of those whose start lies outside of their interval.
-        settings: of the effect whose numbers they are; its orders name harmonics.
+        moved: paths of those whose interval excludes the model's value.
+        settings: of the effect whose parameters they are; its orders name harmonics.
     """
     based = any(n.start is not None for n in numbers.values())
-    head = ["number", "unit", *(["model", "fitted", "moved"] if based else ["fitted"]), "95 % interval"]
+    head = [
+        "parameter",
+        "unit",
+        *(["model", "estimate", "change"] if based else ["estimate"]),
+        "95 % interval",
+    ]
     lines = []
-    # What was moved comes first, what the data do not tell last.
+    # Those that moved come first, those that are not identifiable last.
     order = sorted(numbers, key=lambda name: (name not in moved, numbers[name].interval is None))
     for name in order:
         n = numbers[name]
@@ -91,7 +96,7 @@ def numbers_table(
         cells.append(f"<td>{html.escape(_interval(n, unit))}</td>")
         mark = " class='moved'" if name in moved else ""
         lines.append(f"<tr{mark}>{''.join(cells)}</tr>")
-    right = {"model", "fitted", "moved"}
+    right = {"model", "estimate", "change"}
     titles = "".join(f"<th{' class=n' if h in right else ''}>{h}</th>" for h in head)
     return f"<div class='wide'><table><tr>{titles}</tr>{''.join(lines)}</table></div>"
 
@@ -99,13 +104,15 @@ def numbers_table(
 def _interval(number: FittedNumber, unit: str) -> str:
     if number.interval is None:
         if number.start is None:
-            return "exact, or read from the spectrum"
-        tied = ", ".join(named_number(name)[0] for name in number.tied_to)
-        return "not determined by these data" + (f": cannot be told from {tied}" if tied else "")
+            return "fixed, or read from the spectrum"
+        tied = "; ".join(named_number(name)[0] for name in number.tied_to)
+        return "not identifiable from these data" + (f": confounded with {tied}" if tied else "")
     low, high = number.interval
     text = f"{shown(low)} to {shown(high)}"
     if number.tied_to:
-        text += f": hard to tell from {', '.join(named_number(name)[0] for name in number.tied_to)}"
+        text += (
+            f", from the prior; confounded with {'; '.join(named_number(name)[0] for name in number.tied_to)}"
+        )
     # The size of a phase means nothing; 120 degrees leave two thirds of the circle.
     if high - low > (120.0 if unit == "deg" else WIDE * abs(number.value)):
         text += " (poorly determined)"

@@ -1,4 +1,4 @@
-"""What a diagnosis shows on a terminal: a bar while it runs, then the verdict and the gap table."""
+"""The terminal output of a diagnosis: a bar while it runs, then the verdict and the residuals."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from hdsim.diagnosis.verdict import Verdict
 
-#: How far a diagnosis is, in percent, when it says that it begins with this. Locating and naming are repeated
-#: as long as something is found, so that the bar waits there.
+#: Progress in percent at the beginning of each step. Locating and identifying are repeated as long as
+#: something is found, so that the bar waits there.
 STEPS = {
     "checking the data": 2,
     "predicting": 5,
@@ -32,8 +32,8 @@ STEPS = {
     "proving": 90,
     "finding the next experiment": 95,
 }
-#: Narrow enough for 80 columns; ``left`` is the gap after over the one before.
-_HEAD = ("channel", "before", "re-fit", "after", "noise", "left", "x noise")
+#: Narrow enough for 80 columns.
+_HEAD = ("channel", "before", "re-fit", "after", "noise", "after/\nbefore", "after/\nnoise")
 _STYLE: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "header_style": "bold"}
 _COLOURS = {"nothing": "green", "parameter": "blue", "effect": "dark_orange", "unknown": "magenta"}
 
@@ -72,7 +72,7 @@ class Progress:
 
 
 def show(found: Findings, terminal: Console | None = None) -> None:
-    """Print the verdict, how sure it is, the gap table, why, and what needs attention."""
+    """Print the verdict, its confidence, the held-out residuals, the evidence, and what needs attention."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -87,7 +87,7 @@ def show(found: Findings, terminal: Console | None = None) -> None:
     line(headline(found))
     line(sure.sentence)
     if verdict.gap:
-        table = Table(box=SIMPLE_HEAD, title="\nRMS difference on held-out data", **_STYLE)
+        table = Table(box=SIMPLE_HEAD, title="\nRMS residual on held-out data", **_STYLE)
         for name in _HEAD:
             table.add_column(name, justify="left" if name == "channel" else "right")
         for channel, unit, *numbers in gap_rows(verdict):
@@ -98,7 +98,7 @@ def show(found: Findings, terminal: Console | None = None) -> None:
     for title, head, rows in _reasons(verdict):
         table = Table(box=SIMPLE_HEAD, title=title, **_STYLE)
         for name in head:
-            table.add_column(name, justify="right" if name == "seen" else "left", no_wrap=name != head[0])
+            table.add_column(name, justify="right" if name == "observed" else "left", no_wrap=name != head[0])
         for row in rows:
             table.add_row(*row)
         out.print(table)
@@ -122,9 +122,9 @@ def _reasons(verdict: Verdict) -> list[tuple[str, tuple[str, ...], list[list[str
     found: list[tuple[str, tuple[str, ...], list[list[str]]]] = []
     for one in weighings(verdict.because):
         rows = [[w.words, w.seen, odds(w.log_odds)] for w in one.weights]
-        said = f"{percent(one.probability)}, {'named' if one.named else 'not named'}"
-        found.append((f"Why: {title_of(one.name)} ({said})", ("evidence", "seen", "odds"), rows))
+        said = f"{percent(one.probability)}, {'identified' if one.named else 'not identified'}"
+        found.append((f"Why: {title_of(one.name)} ({said})", ("evidence", "observed", "odds"), rows))
     rows = [[c.words, c.seen, c.limit, "yes" if c.met else "no"] for c in conditions(verdict.because)]
     if rows:
-        found.append(("Why", ("asked", "seen", "counts from", "does it?"), rows))
+        found.append(("Why", ("criterion", "observed", "threshold", "met"), rows))
     return found

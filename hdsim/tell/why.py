@@ -1,4 +1,4 @@
-"""The report's section that says why: what spoke for and against each name, and which limits were met."""
+"""The report's section that says why: the evidence on each effect, and which thresholds were met."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ def why(found: Findings) -> str:
         )
         body += "".join(_weighing(found, one, reach) for one in names)
         body += (
-            "<p class='note'>Each piece of evidence multiplies the odds that the name, or one of its group, "
-            "is right; bars to the right speak for it, to the left against. Their lengths are logarithms, so "
-            "they add up to the last row.</p>"
+            "<p class='note'>Each piece of evidence multiplies the odds that the effect, or one of its "
+            "group, is "
+            "the right one; bars to the right are evidence for it, to the left against it. Their lengths are "
+            "logarithms and add up to the last row.</p>"
         )
     if limits:
-        body += f"<h3>{'Is anything there at all?' if names else 'What was asked'}</h3>" + _conditions(limits)
+        body += f"<h3>{'Is there a systematic residual?' if names else 'Criteria'}</h3>" + _conditions(limits)
     return section("Why this verdict", f"<p>{html.escape(_sum(found, names))}</p>{body}")
 
 
@@ -45,44 +46,42 @@ def _title(found: Findings, name: str) -> str:
 
 
 def _sum(found: Findings, names: list[Weighing]) -> str:
-    """What the reasons amount to, in a sentence."""
+    """The conclusion from the evidence, in a sentence."""
     kind = found.verdict.verdict
     if kind == "effect":
-        said = "The evidence makes " + ("the name" if len(found.verdict.effects) == 1 else "the names")
-        said += " likely enough to be given."
+        said = "The evidence identifies " + (
+            "the effect." if len(found.verdict.effects) == 1 else "the effects."
+        )
         if any(not one.named for one in names):
-            said += " What was found beside and is not likely enough has been left out of the model."
+            said += " Further effects that are not probable enough have been left out of the model."
         return said
     if kind == "unknown" and names:
-        return "Something is there, but no name for it is likely enough to be given."
+        return "There is a systematic residual, but no effect is probable enough to be identified."
     if kind == "unknown":
-        return "Something is there that no effect was found for."
+        return "There is a systematic residual, and no effect was found that explains it."
+    noise = "The residual is not systematic and not above the noise"
     if kind == "parameter":
-        return (
-            "No pattern and no more than noise is left, and the re-fitted numbers close a gap on unseen data."
-        )
+        return f"{noise}, and the re-estimated parameters reduce a residual on held-out data."
     if any(one.rule.startswith("the re-fit") and one.holds for one in found.verdict.because):
-        return "No pattern and no more than noise is left, and no number that would close the gap stands out."
-    return "No pattern and no more than noise is left, and the re-fitted numbers close no gap worth naming."
+        return f"{noise}, and no single parameter accounts for the reduction by the re-fit."
+    return f"{noise}, and the re-estimated parameters do not reduce it noticeably."
 
 
 def _weighing(found: Findings, one: Weighing, reach: float) -> str:
-    said = "named" if one.named else "not named"
-    likely = f"{percent(one.probability)} likely to be right" if math.isfinite(one.probability) else ""
-    needed = f"a name needs {percent(one.needed)}" if math.isfinite(one.needed) else ""
+    said = "identified" if one.named else "not identified"
+    likely = f"probability {percent(one.probability)}" if math.isfinite(one.probability) else ""
+    needed = f"threshold {percent(one.needed)}" if math.isfinite(one.needed) else ""
     about = "; ".join(part for part in (likely, needed) if part)
     title = f"{_title(found, one.name)}: {said}"
     head = f"<h3>{html.escape(title)}{f' <small>({html.escape(about)})</small>' if about else ''}</h3>"
     rows = ""
     if math.isfinite(one.prior):
-        rows += _row("before any of it", "", one.prior, reach)
+        rows += _row("prior", "", one.prior, reach)
     rows += "".join(_row(w.words, w.seen, w.log_odds, reach) for w in one.weights)
     if math.isfinite(one.total):
-        rows += _row("All together", percent(one.probability), one.total, reach, "sum")
-    titles = (
-        "<tr><th>evidence</th><th class='n'>seen</th><th class='odds'>against · for</th><th>odds</th></tr>"
-    )
-    return f"{head}<div class='wide'><table class='why'>{titles}{rows}</table></div>"
+        rows += _row("posterior", percent(one.probability), one.total, reach, "sum")
+    titles = "<th>evidence</th><th class='n'>observed</th><th class='odds'>against · for</th><th>odds</th>"
+    return f"{head}<div class='wide'><table class='why'><tr>{titles}</tr>{rows}</table></div>"
 
 
 def _row(words: str, seen: str, weight: float, reach: float, kind: str = "") -> str:
@@ -99,4 +98,4 @@ def _row(words: str, seen: str, weight: float, reach: float, kind: str = "") -> 
 
 def _conditions(limits: list[Condition]) -> str:
     rows = [[one.words, one.seen, one.limit, "yes" if one.met else "no"] for one in limits]
-    return table(("asked", "seen", "counts from", "does it?"), rows, (1, 2))
+    return table(("criterion", "observed", "threshold", "met"), rows, (1, 2))

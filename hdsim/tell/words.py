@@ -1,4 +1,4 @@
-"""Names, numbers and units as readers who have never seen hdsim write them."""
+"""Names, numbers and units, as they are written for readers who do not know hdsim."""
 
 from __future__ import annotations
 
@@ -42,31 +42,31 @@ def shown(value: float) -> str:
 
 
 def short(value: float, digits: int = 3) -> str:
-    """A number with few digits; what is no number is said to be unknown."""
+    """A number with few digits; ``UNKNOWN`` for what is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else UNKNOWN
 
 
 def times(value: float) -> str:
-    """How many times something is something else: with a decimal as long as that tells."""
+    """A ratio as a multiple, with a decimal where it is significant: ``1.4 times``."""
     return f"{value:.1f} times" if abs(value) < 9.95 else f"{short(value)} times"
 
 
 def percent(share: float) -> str:
-    """A share in percent; what resampling cannot tell from all is not called all."""
+    """A share in percent; above 99.5 % it is given as a bound, as resampling resolves no more."""
     if not math.isfinite(share):
         return UNKNOWN
     return "over 99\u00a0%" if share > 0.995 else f"{100 * share:.0f}\u00a0%"
 
 
 def below(chance: float) -> str:
-    """A probability in percent; what so many draws cannot tell from zero is said as a bound."""
+    """A probability in percent; below 0.5 % it is given as a bound, as the draws resolve no less."""
     if not math.isfinite(chance):
         return UNKNOWN
     return f"less than {100 * chance:.2g}\u00a0%" if chance <= 0.005 else f"{100 * chance:.2g}\u00a0%"
 
 
 def of_ten(probability: float) -> str:
-    """A probability as how many of ten, or of more where ten do not tell: ``9 in 10``."""
+    """A probability as a count out of ten, or of more where ten are too coarse: ``9 in 10``."""
     if not math.isfinite(probability):
         return UNKNOWN
     if probability >= 0.99:
@@ -79,17 +79,17 @@ def of_ten(probability: float) -> str:
 
 
 def odds(weight: float) -> str:
-    """What a logarithm of odds does to them: ``12 : 1 for``, ``3 : 1 against``."""
+    """Log odds as a factor: ``12 : 1 for``, ``3 : 1 against``."""
     factor = math.exp(min(abs(weight), 700.0))
     if not factor >= 1.05:
-        return "neither way"
+        return "neutral"
     side = "for" if weight > 0 else "against"
     many = f"over {LARGE_ODDS:.0f}" if factor > LARGE_ODDS else f"{factor:.{0 if factor >= 9.95 else 1}f}"
     return f"{many.removesuffix('.0')} : 1 {side}"
 
 
 def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[str, str]:
-    """Words and unit of a number by its path: ``drive.friction.coulomb_nm`` is friction, coulomb in N m.
+    """Name and unit of a parameter by its path: ``drive.friction.coulomb_nm`` is friction, coulomb in N m.
 
     Args:
         path: dotted path.
@@ -120,7 +120,7 @@ def written(unit: str) -> str:
 
 
 def unit_of(gap: Gap) -> units.Unit:
-    """The unit in which a gap is readable; gaps are stored in SI units."""
+    """The unit in which a held-out residual is readable; it is stored in SI units."""
     if gap.unit == "rad":
         return units.for_error(gap.before)
     return units.for_torque(gap.before) if gap.unit == "N m" else units.Unit(gap.unit, 1.0)
@@ -135,5 +135,5 @@ def title_of(name: str) -> str:
 
 
 def titles_of(effect: NamedEffect) -> list[str]:
-    """The effect's title, and the titles of those that it cannot be told from."""
+    """The effect's title, and the titles of those that the data cannot distinguish from it."""
     return [effect.title or spoken(effect.name), *map(title_of, effect.indistinguishable_from)]

@@ -1,4 +1,4 @@
-"""What is said beside the model's gap: what a regression, and a black box, leave of the same data."""
+"""What is said beside the model's gap: what a regression, and gradient boosting, leave of the same data."""
 
 import pytest
 from rich.console import Console
@@ -9,11 +9,11 @@ from hdsim.tell.terminal import show
 
 
 @pytest.mark.parametrize(
-    ("evidence", "model"), [(EFFECT, "the named physics"), (NOTHING, "the fitted model")]
+    ("evidence", "model"), [(EFFECT, "the model with the identified effects"), (NOTHING, "the fitted model")]
 )
 def test_page_and_terminal_say_what_a_regression_leaves(tmp_path, evidence, model):
     found = told(evidence)
-    said = f"motor torque: a plain regression leaves 3.2 mN m, {model} 2.1, noise 2"
+    said = f"motor torque: linear regression 3.2 mN m, {model} 2.1, noise 2"
     assert said in page(found, tmp_path)
     terminal = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
     show(found, terminal)
@@ -22,7 +22,7 @@ def test_page_and_terminal_say_what_a_regression_leaves(tmp_path, evidence, mode
 
 def test_a_black_box_stands_between_the_two():
     (said,) = baselines({"motor_torque": GAP.model_copy(update={"black_box": 0.0025})})
-    assert "leaves 3.2 mN m, a black box 2.5, the fitted model 2.1" in said
+    assert "linear regression 3.2 mN m, gradient boosting 2.5, the fitted model 2.1" in said
 
 
 def test_without_a_baseline_nothing_is_said():

@@ -58,7 +58,7 @@ def test_effects_on_the_way_have_bars_between_the_refit_and_the_end():
     )
     bars = gap_bars(two)["motor_torque"]
     assert [label for label, *_ in bars] == [
-        "model as given", "own numbers re-fitted", "with unbalance", "with both effects",
+        "model as given", "parameters re-fitted", "with unbalance", "with both effects",
     ]  # fmt: skip
     assert [value for _, value, *_ in bars] == [GAP.before, GAP.refit, 0.009, GAP.after]
 

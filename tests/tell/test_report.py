@@ -62,7 +62,7 @@ def test_the_page_says_what_is_missing_how_sure_it_is_and_what_it_gains(found, o
     said = [headline(found), sureness(found).words, sureness(found).number]
     places = [body.index(html.escape(line)) for line in said]
     assert places == sorted(places)
-    assert places[-1] < body.index("How far off the model is")
+    assert places[-1] < body.index("RMS residual on held-out data")
     for gap in verdict.gap.values():
         unit = unit_of(gap)
         for value in (gap.before, gap.refit, gap.after, gap.noise):
@@ -143,8 +143,8 @@ def test_alternatives_stand_side_by_side_with_what_separates_them(found, tmp_pat
         scenario="out/next.yaml",
     )  # fmt: skip
     text = changed(found, tmp_path, effects=[effect], next_experiment=proposal)
-    first = text[: text.index("How far off the model is")]
-    assert "Maxwell slip) or torsional hysteresis (Duhem) (these data cannot tell which)" in first
+    first = text[: text.index("RMS residual on held-out data")]
+    assert "Maxwell slip) or torsional hysteresis (Duhem) (not distinguishable with these data)" in first
     assert "Fairly sure that it is one of these, not which" in first
     assert "7 in 10 of such verdicts are right" in first
     assert "compare &lt;minor&gt; loops" in text
@@ -185,10 +185,10 @@ def test_moved_and_undetermined_numbers_say_so(found, tmp_path):
         found, tmp_path, verdict="parameter", effects=[], parameters=numbers,
         moved=["drive.friction.coulomb_nm"], data_problems=[problem], not_tried={"unbalance": "no <gravity>"},
     )  # fmt: skip
-    assert "one number of the model is off: friction, coulomb 0.045 instead of 0.03 N m" in text
+    assert "one parameter of the model is wrong: friction, coulomb 0.045 instead of 0.03 N m" in text
     assert "<tr class='moved'><td>friction, coulomb" in text
     assert "+50.0 %" in text
-    assert "not determined by these data: cannot be told from load, inertia" in text
+    assert "not identifiable from these data: confounded with load, inertia" in text
     assert "3 &lt;spikes&gt;" in text
     assert "1 problem in the data" in text
     assert "no &lt;gravity&gt;" in text

@@ -28,7 +28,7 @@ def test_the_evidence_by_hand_is_of_its_kind(kind):
 def test_every_reason_is_on_the_page(kind, tmp_path):
     found = told(KINDS[kind])
     text = page(found, tmp_path)
-    why = text[text.index("<h2>Why this verdict</h2>") : text.index("<h2>Where the difference lives")]
+    why = text[text.index("<h2>Why this verdict</h2>") : text.index("<h2>What the residual depends on")]
     for reason in found.verdict.because:
         if reason.rule != LIKELY:
             said = wording(reason.rule)
@@ -86,9 +86,9 @@ def test_what_is_not_believed_stands_beside_what_is(tmp_path):
     found = told(evidence)
     assert [effect.name for effect in found.verdict.effects] == ["motor_torque_ripple"]
     text = page(found, tmp_path)
-    assert re.search(r"<h3>Motor.torque ripple: named", text)
-    assert re.search(r"<h3>[^<]*nbalance[^<]*: not named", text)
-    assert "has been left out of the model" in text
+    assert re.search(r"<h3>Motor.torque ripple: identified", text)
+    assert re.search(r"<h3>[^<]*nbalance[^<]*: not identified", text)
+    assert "have been left out of the model" in text
 
 
 def test_bars_point_to_the_side_that_the_evidence_speaks_for(tmp_path):
@@ -121,13 +121,13 @@ def test_a_rule_that_has_no_words_here_is_told_by_its_own():
 @pytest.mark.parametrize(
     ("weight", "text"),
     [
-        (0.0, "neither way"),
+        (0.0, "neutral"),
         (math.log(4.0), "4 : 1 for"),
         (-math.log(2.5), "2.5 : 1 against"),
         (math.log(16.2), "16 : 1 for"),
         (-50.0, "over 1000 : 1 against"),
         (math.inf, "over 1000 : 1 for"),
-        (math.nan, "neither way"),
+        (math.nan, "neutral"),
     ],
 )
 def test_odds_in_words(weight, text):

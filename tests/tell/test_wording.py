@@ -64,7 +64,7 @@ def test_a_name_is_as_sure_as_it_is_likely(probability, words, number):
     ("evidence", "left"),
     [
         ({"rest": rest(4.2)}, "4.2 times the noise of the motor torque"),
-        ({"explained": 0.84}, "16\u00a0% of the structure"),
+        ({"explained": 0.84}, "16\u00a0% of the systematic residual"),
         ({"rest": rest(50.0), "explained": 0.23}, "50 times the noise of the motor torque and 77\u00a0%"),
     ],
 )
@@ -83,13 +83,14 @@ def test_what_only_an_effect_without_a_name_explains_is_left_too():
     gap = GAP.model_copy(update={"after": 2.5 * GAP.noise})
     found = type(found)(found.verdict.model_copy(update={"gap": {"motor_torque": gap}}), found.evidence)
     assert (
-        much_left(found) == "2.5 times the noise of the motor torque and 16\u00a0% of the structure are left"
+        much_left(found)
+        == "2.5 times the noise of the motor torque and 16\u00a0% of the systematic residual remain"
     )
     assert sureness(found).words != "Very sure"
 
 
 def test_what_is_left_is_on_the_page(tmp_path):
-    assert "<p class='left'>But 16\u00a0% of the structure is left.</p>" in page(
+    assert "<p class='left'>But 16\u00a0% of the systematic residual remains.</p>" in page(
         confident(0.995, explained=0.84), tmp_path
     )
     assert "class='left'" not in page(confident(0.995), tmp_path)
@@ -106,39 +107,41 @@ def test_numbers_that_are_far_off_are_not_very_sure_while_much_is_left():
     assert sureness(told(PARAMETER, **fields)).words == "Very sure"
     left = told(PARAMETER.model_copy(update={"rest": rest(3.0)}), **{"verdict": "parameter"} | fields)
     assert sureness(left).sentence.startswith("Sure: ")
-    assert sureness(left).sentence.endswith("But 3.0 times the noise of the motor torque is left.")
+    assert sureness(left).sentence.endswith("But 3.0 times the noise of the motor torque remains.")
 
 
 def test_a_group_is_sure_as_a_group():
     found = told(EFFECT.model_copy(update={"laws": [law(group=["unbalance"])]}))
-    assert "(these data cannot tell which)" in headline(found)
+    assert "(not distinguishable with these data)" in headline(found)
     assert "that it is one of these, not which" in sureness(found).words
 
 
 def test_each_of_several_names_has_its_own_probability():
     found = told(EFFECT.model_copy(update={"laws": [law(), law("unbalance", sampled=0.95, needed=0.97)]}))
     first, second, chance = sureness(found).details
-    assert first == "Motor torque ripple: over 99 in 100 of such names are right."
+    assert first == "Motor torque ripple: over 99 in 100 of such identifications are right."
     assert second.startswith("Unbalance: ")
     assert "less than 0.25\u00a0% of cases" in chance
-    assert sureness(found).number.endswith("of such names are right")
+    assert sureness(found).number.endswith("of such identifications are right")
 
 
 def test_what_a_name_leaves_is_said_with_its_place():
     stages = [stage(0.9, 0.0025), stage(0.4, 0.0025)]
     found = told(EFFECT.model_copy(update={"explained": 0.91, "left_chance": 0.0025, "stages": stages}))
-    assert headline(found).endswith("9\u00a0% of the structure follows another shape, over the output angle.")
-    assert "another shape" not in headline(told(EFFECT.model_copy(update={"explained": 0.91})))  # chance
+    assert headline(found).endswith(
+        "9\u00a0% of the systematic residual remains, a function of the output angle."
+    )
+    assert "residual remains" not in headline(told(EFFECT.model_copy(update={"explained": 0.91})))  # chance
 
 
 def test_a_curve_beside_a_name_is_what_the_name_leaves(tmp_path):
     changed = {"explained": 0.91, "left_chance": 0.0025}
     found = told(EFFECT.model_copy(update=changed), curve=CURVE, scenario="out/found.yaml")
     text = page(found, tmp_path)
-    assert "What the named effects leave" in text
-    assert "9\u00a0% of it (of the structure that the re-fitted model left) follows another shape" in text
-    assert "The curve that is missing" not in text
-    assert "the model with what was found" in text
+    assert "Residual of the identified effects" in text
+    assert "9\u00a0% of the systematic residual of the re-fitted model does not follow the equation" in text
+    assert "The unidentified effect as a curve" not in text
+    assert "the model with the result" in text
     assert "with the curve" not in text
     assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
 
@@ -147,10 +150,10 @@ def test_what_has_no_name_is_said_with_what_came_nearest(tmp_path):
     found = told(UNKNOWN, suspects={"stribeck_friction": 0.86})
     said = headline(found)
     assert "Stribeck" in said
-    assert "86\u00a0% of the structure" in said
+    assert "86\u00a0% of the systematic residual" in said
     text = page(found, tmp_path)
     assert "nothing in the catalogue explains" not in text.lower()
-    assert "No known effect comes near" not in text
+    assert "No known effect comes close" not in text
     assert "Sure that something is missing, not what" in text
     assert any(f"is right in {n} in 10 cases" in text for n in range(6))
 
@@ -162,7 +165,7 @@ def test_a_fitted_candidate_comes_nearest_where_no_law_was_added():
     said = headline(told(UNKNOWN.model_copy(update={"laws": [], "stages": stages})))
     assert "Stribeck" in said
     assert "60\u00a0%" in said
-    assert "No known effect comes near" in headline(
+    assert "No known effect comes close" in headline(
         told(UNKNOWN.model_copy(update={"laws": [], "stages": [stage(0.9, 0.0025)]}))
     )
 
@@ -170,7 +173,7 @@ def test_a_fitted_candidate_comes_nearest_where_no_law_was_added():
 def test_vibration_is_called_so():
     shaken = stage(0.9, 0.0025)
     shaken.places = [place("frequency", 0.7)]
-    assert "is vibration that the motion shakes up" in headline(
+    assert "is vibration excited by the motion" in headline(
         told(UNKNOWN.model_copy(update={"stages": [shaken]}))
     )
 
@@ -183,7 +186,7 @@ def test_what_happens_once_is_said_with_its_time():
     found = told(PLACELESS, remainder=ONCE)
     assert "between 0.5 and 0.9 s" in headline(found)
     assert "perhaps once only" in meaning(found)
-    assert sureness(found).number == "16 times the noise"
+    assert sureness(found).number == "a residual of 16 times the noise"
 
 
 @pytest.mark.parametrize("changes", [{"curve": CURVE}, {}])
@@ -206,8 +209,8 @@ def test_a_suspect_that_may_be_chance_is_not_sure():
 def test_nothing_is_said_with_what_is_left(tmp_path):
     gap = {"motor_torque": GAP.model_copy(update={"after": 1.25 * GAP.noise})}
     text = page(told(NOTHING, gap=gap), tmp_path)
-    assert "The data show nothing that the model lacks." in text
-    assert "1.2 times the noise is left" in text
+    assert "The data show no effect that is missing from the model." in text
+    assert "the residual is 1.2 times the noise" in text
     assert "may still be there" in text
 
 
