@@ -39,7 +39,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "reproduce": ("hdsim.reproduce.commands:reproduce", "Recompute every number of the source paper."),
     "validate": (
         "hdsim.validate.commands:validate",
-        "Hold hdsim against printed, measured and independent values.",
+        "Compare hdsim with printed, measured and independent values.",
     ),
     "surface": ("hdsim.surface.commands:surface", "Find D and G of a measured flank."),
     "plot": ("hdsim.plot.commands:plot", "Draw the one-page figure of a log."),
@@ -50,10 +50,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("hdsim.export.commands:export", "Write a log or a scenario for other programs."),
     "verify": ("hdsim.log.commands:verify", "Check every record of a log."),
     "layout": ("hdsim.log.commands:layout", "Print a layout that shows a log in Foxglove."),
-    "fit": ("hdsim.tell.fit_commands:fit", "Fit a scenario's numbers to measured records."),
+    "fit": ("hdsim.tell.fit_commands:fit", "Estimate a scenario's parameters from measured records."),
     "diagnose": (
         "hdsim.tell.commands:diagnose",
-        "Find what a model is missing against measured records.",
+        "Find which physical effect a model is missing.",
     ),
     "recover": ("hdsim.log.commands:recover", "Save what a damaged or unfinished log holds."),
 }

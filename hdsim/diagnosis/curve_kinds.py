@@ -57,7 +57,7 @@ class Kind:
     @property
     def words(self) -> str:
         """For a sentence: what over what."""
-        turned = ", turned with the direction" if self.times_direction else ""
+        turned = ", times the sign of the velocity" if self.times_direction else ""
         return f"{_ACTS[self.acts_on]} over {_WORDS[self.coordinate]}{turned}"
 
     def curve(self, at: Array, values: Array) -> TableCurve:

@@ -90,7 +90,7 @@ def propose(
     words = dict(titles or {})
     said = {name: words.get(name, name.replace("_", " ")) for name in names}
     one, other = (said[name] for name in chosen.pair)
-    hardest = f" between {one} and {other}, the hardest to tell" if len(names) > 2 else ""
+    hardest = f" between {one} and {other}, the hardest to distinguish" if len(names) > 2 else ""
     channel = chosen.channel.replace("_", " ")
     apart = f"{', '.join(list(said.values())[:-1])} and {said[names[-1]]}"
     considered = [
@@ -105,13 +105,13 @@ def propose(
     if unit.name == "rad":
         unit = units.for_error(chosen.difference)
     sentence = (
-        f"To tell {apart} apart: {chosen.experiment.title}. Expected d' {_said(chosen.separation)}{hardest} "
-        f"({_said(again)} from repeating the record). Look at {channel}: they say up to "
-        f"{unit.factor * chosen.difference:.2g} {unit.name} apart, at {chosen.at_s:.2g} s."
+        f"To distinguish {apart}: {chosen.experiment.title}. Expected d' {_said(chosen.separation)}{hardest} "
+        f"({_said(again)} from repeating the record). Look at {channel}: their predictions "
+        f"differ by up to {unit.factor * chosen.difference:.2g} {unit.name}, at {chosen.at_s:.2g} s."
     )
     if chosen.separation < TELLS:
         sentence = (
-            f"None of the {len(ranked)} experiments that were tried would tell {apart} apart: the best of "
+            f"None of the {len(ranked)} experiments that were tried would distinguish {apart}: the best of "
             f"them, {chosen.experiment.title}, has an expected d' of {_said(chosen.separation)} (it takes "
             f"{TELLS:g} to be right five times of six)."
         )

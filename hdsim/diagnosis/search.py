@@ -96,7 +96,7 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
     """The search's last fit carried on to its optimum, without needless names, with the covariance there."""
     found.fit = together(bench, found.fit)
     if found.named:
-        tell = during("again", "asking for each name beside the others")
+        tell = during("again", "testing each effect beside the others")
         count = len(found.named)
         found.fit = revised(bench, found.fit, found.named, tell)
         if 1 < len(found.named) < count:
@@ -118,7 +118,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     """The model with one more effect; None when nothing significant is left, or nothing that matters."""
     current = found.fit = read_late(bench, found.fit)
     title = "refit" if not found.named else f"with {found.named[-1].name}"
-    during("locate", f"locating what is left {title}")
+    during("locate", f"locating the residual {title}")
     found.left = left_of(bench, current)
     stage = Stage(
         title, locate(bench, found.left, bench.residuals(current.predictions, drift=True)), found.left.power
@@ -147,7 +147,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
-        tell = during("again", "asking each name again beside the others")
+        tell = during("again", "testing each effect again beside the others")
         if current.undetermined:
             current = together(bench, current, rough=True)
         current = _again(bench, base, current, found, tell)

@@ -93,7 +93,7 @@ def diagnose(
     Args:
         measured: records that fits may see.
         scenario: the model; what it commands does not matter, its motion is the measured one.
-        holdout: records that only the proof sees; parts of ``measured`` when there are none.
+        holdout: validation records, used in no fit; parts of ``measured`` when there are none.
         load: where the load's torque comes from; ``output_torque`` takes what the joint's sensor measures.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
         force: go on in spite of errors in the data.
@@ -141,7 +141,7 @@ def _diagnosed(
     with step("compare", "predicting the measured channels"):
         readings = readings_of_means([*records, *held], load=load, locked=locked_side(scenario))
         bench = bench_for(records, held, scenario, load, readings=readings, zeros=zeros)
-    with step("refit", "re-fitting the model's own numbers"):
+    with step("refit", "re-fitting the parameters of the model"):
         try:
             base = refit(bench, start)
         except PredictionError as error:
@@ -158,7 +158,7 @@ def _diagnosed(
     with running:
         found = search(bench, base.fit, during)
     states = {"before": start, "refit": base.fit.state, "after": found.fit.state}
-    with step("prove", "proving on held-out data"):
+    with step("prove", "validating on held-out data"):
         gap, predictions = gaps(bench, states)
     evidence = collect(bench, base, found, gap, predictions)
     decision = decide(evidence)
@@ -171,17 +171,17 @@ def _diagnosed(
     place = (found.stages[0] if unknown else found.stages[-1]).location
     if unknown or (named and evidence.left_chance <= RULES.chance):
         # What has no name, or what the names leave of their own, is a curve.
-        with step("curve", "fitting the curve of what has no name"):
+        with step("curve", "fitting the curve of the unidentified effect"):
             curve = fit_curve(bench, current, place, on_step=tell)
     if unknown and curve is not None:
-        with step("prove", "proving on held-out data"):
+        with step("prove", "validating on held-out data"):
             _, there = gaps(bench, states | {"after": curve.fit.state})
             curve = curve if borne_out(bench, there)[0] >= HALF else None
         current = curve.fit if curve is not None else current
     if current is not found.fit:
-        with step("prove", "proving on held-out data"):
+        with step("prove", "validating on held-out data"):
             gap, predictions = gaps(bench, states | {"after": current.state})
-    with step("prove", "proving on held-out data"):
+    with step("prove", "validating on held-out data"):
         gap = with_baselines(bench, start, gap, black_box=black_box)
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
@@ -222,7 +222,8 @@ def _diagnosed(
     elif decision.kind == "parameter":
         verdict = _numbers_off(off, common, sure=bool(moved))
     else:
-        verdict = Verdict(verdict="nothing", sentence="The data show nothing that the model lacks.", **common)
+        said = "The data show no effect that is missing from the model."
+        verdict = Verdict(verdict="nothing", sentence=said, **common)
     if doubts:
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
@@ -240,11 +241,12 @@ def _only(bench: Bench, base: Refit, found: Search, believed: Sequence[int]) -> 
 def _without_a_name(stages: Sequence[Stage], evidence: Evidence, common: Mapping[str, Any]) -> Verdict:
     place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
     nearest = ", ".join(law.name.replace("_", " ") for law in evidence.laws)
-    said = f"; nearest: {nearest}, {100 * evidence.explained:.0f} % of the structure" if nearest else ""
+    share = f"{100 * evidence.explained:.0f} % of the systematic residual"
+    said = f"; closest: {nearest}, {share}" if nearest else ""
     return Verdict(
         verdict="unknown",
-        sentence="Something is missing that nothing in the catalogue explains well enough to be named: "
-        f"{100 * place.share:.0f} % of what is left of {place.channel} is a function of "
+        sentence="An effect is missing, and none of the catalogue explains enough to be identified: "
+        f"{100 * place.share:.0f} % of the residual of {place.channel} is a function of "
         f"{place.coordinate.replace('_', ' ')}{said}.",
         suspects={law.name: round(law.gain, 3) for law in evidence.laws},
         **common,
@@ -256,9 +258,9 @@ def _without_a_place(bench: Bench, last: Fit, common: Mapping[str, Any]) -> Verd
     assert rest is not None  # the evidence has said so
     return Verdict(
         verdict="unknown",
-        sentence=f"Something is missing that nothing in the catalogue explains: {rest.channel} of "
-        f"{rest.record} is left with up to {rest.times_noise:.2g} times its noise, most of it "
-        f"between {rest.start_s:.3g} and {rest.end_s:.3g} s, and a function of no coordinate that "
+        sentence="An effect is missing that no effect of the catalogue explains: the residual of "
+        f"{rest.channel} in {rest.record} reaches {rest.times_noise:.2g} times its noise, most of it "
+        f"between {rest.start_s:.3g} and {rest.end_s:.3g} s, and is a function of no regressor that "
         "these data repeat.",
         remainder=rest,
         **common,
@@ -272,14 +274,14 @@ def _rest_words(last: Stage, evidence: Evidence) -> str:
         return ""
     place = last.location.places[0]
     coordinate = place.coordinate.replace("_", " ")
-    return f" {100 * left:.0f} % of the structure follows another shape, over the {coordinate}."
+    return f" {100 * left:.0f} % of the systematic residual remains, a function of the {coordinate}."
 
 
 def _numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:
     changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
-    said = f"numbers of the model are off: {', '.join(changes)}."
+    said = f"parameters of the model are wrong: {', '.join(changes)}."
     if not sure:
-        said = f"a number of the model is off, most simply {' or '.join(i.name for i in off)}."
+        said = f"a parameter of the model is wrong, most simply {' or '.join(i.name for i in off)}."
     return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
 
 
@@ -318,7 +320,8 @@ def _effects(named: Sequence[Named], decision: Decision, final: Fit) -> list[Nam
 
 def _words(effect: NamedEffect) -> str:
     others = [catalogue()[name].title for name in effect.indistinguishable_from]
-    return f"{effect.title} (these data cannot tell it from {', '.join(others)})" if others else effect.title
+    alike = f"{effect.title} (not distinguishable with these data from {', '.join(others)})"
+    return alike if others else effect.title
 
 
 def _located(stages: Sequence[Stage], most: int = 6) -> list[Located]:

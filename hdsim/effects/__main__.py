@@ -23,11 +23,11 @@ _SCALES: dict[Scale, str] = {
 HEAD = """\
 # Effects
 
-Each effect is one file in `hdsim/effects/` and off until a scenario names it:
+Each effect is one file in `hdsim/effects/`, and part of a model only where the scenario lists it:
 
 ```yaml
 effects:
-  kinematic_error: {}            # its default numbers
+  kinematic_error: {}            # default parameters
   stribeck_friction:
     extra_static_nm: 0.01
 ```
@@ -41,11 +41,11 @@ the drive creeps instead of sticking; LuGre friction and hysteresis have states 
 The defaults below are those of size 20 at ratio 100. For another drive they grow with what *usually* is a
 multiple of; kinematic error and torsional hysteresis follow the printed accuracy and hysteresis loss of the
 preset. `effects: {set: catalogue}` turns these two on, so that a preset shows what its catalogue prints; an
-effect named beside it has its own numbers, `null` turns it off. `hdsim check` prints the numbers in use, and
-the log keeps them.
+effect listed beside it has the parameters given there, `null` turns it off. `hdsim check` prints the
+parameters in use, and the log keeps them.
 
-*Usually* is where an engineer expects a number before a measurement, and no bound; T_N is the rated torque,
-K1 the drive's first stiffness. What no number can be, the field refuses.
+*Usually* is the range that an engineer expects before a measurement, not a bound; T_N is the rated torque,
+K1 the drive's first stiffness. The field itself refuses values that are physically impossible.
 
 A new effect is a new file with one subclass of `hdsim.parts.Effect`. This page is printed by
 `python -m hdsim.effects`.

@@ -129,7 +129,7 @@ def estimate(
     Args:
         measured: records that the fit sees.
         scenario: the model; what it commands does not matter, its motion is the measured one.
-        holdout: records that only the proof sees; parts of ``measured`` when there are none.
+        holdout: validation records, used in no fit; parts of ``measured`` when there are none.
         free: paths of the only numbers that move; all that the model declares when empty. Numbers of a group
             that are named together scale together.
         fix: paths of numbers that do not.
@@ -155,13 +155,13 @@ def estimate(
     known = base_freedoms(start, bench.channels, load_known=bench.load_known, locked=locked, apart=apart)
     frees = chosen(start, known, free=free, fix=fix, apart=apart)
     begins = [float(predictor.motor_angle[0]) for predictor in bench.predictors]
-    tell("fitting the numbers")
+    tell("estimating the parameters")
     try:
         found = refit(bench, start, frees)
     except PredictionError as error:
         said = ", ".join(record.name for record in records)
         raise InputError(f"{said}: the model cannot follow the measured motion: {error}") from None
-    tell("proving on held-out data")
+    tell("validating on held-out data")
     states = {"before": start, "refit": found.fit.state, "after": found.fit.state}
     gap, predictions = gaps(bench, states)
     gap = with_baselines(bench, start, gap, black_box=black_box)
@@ -226,7 +226,7 @@ def chosen(
         more = undeclared(state, path, ASKED_PRIOR) if path in free else None
         if more is None:
             raise InputError(
-                f"{path}: no number of this model above zero that these data could tell; {there}"
+                f"{path}: no parameter of this model above zero that these data could identify; {there}"
             )
         extra.append(more)
     both = sorted(set(free) & set(fix))
@@ -235,7 +235,7 @@ def chosen(
     found = [_without(state, each, free, fix) for each in [*known, *extra]]
     left = [each for each in found if each is not None]
     if not left:
-        raise InputError(f"no number is left to fit: {there}")
+        raise InputError(f"no free parameter: {there}")
     return left
 
 

@@ -14,32 +14,32 @@ class Part(BaseModel):
 
 
 class FittedNumber(Part):
-    """A fitted number."""
+    """A parameter estimate."""
 
     value: float
     """Its value, in the unit of its field's name."""
     interval: tuple[float, float] | None = None
-    """95 % interval; null when the data do not determine it."""
+    """95 % confidence interval; null when it is not identifiable from the data."""
     start: float | None = None
     """Its value in the base model, where it has one."""
     tied_to: list[str] = []
-    """Numbers that these data cannot tell it from."""
+    """Parameters that it is confounded with in these data."""
 
 
 class Gap(Part):
-    """Root-mean-square difference of measurement and model in one channel, on held-out data."""
+    """Root-mean-square residual (measurement minus model) of one channel, on held-out data."""
 
     before: float
     """Of the model as given, offsets removed."""
     refit: float
-    """After its own numbers were fitted."""
+    """Of the model with re-estimated parameters."""
     after: float
-    """With the named effects."""
+    """With the identified effects."""
     noise: float
-    """Standard deviation of the channel's noise, as neighbouring readings differ by it: a mark, and no bound.
-    Errors that last over many readings are larger; what can be foretold of them a model may come below."""
+    """Standard deviation of the channel's noise, from differences of neighbouring readings: no lower bound.
+    Slowly varying errors exceed it; a model that predicts a part of them may come below."""
     regression: float | None = None
-    """Of a plain regression of the same training samples (``hdsim/estimate/baseline.py``)."""
+    """Of a linear regression of the same training samples (``hdsim/estimate/baseline.py``)."""
     black_box: float | None = None
     """Of gradient boosting after that regression, where it was asked for."""
     unit: str

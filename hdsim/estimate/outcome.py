@@ -10,18 +10,18 @@ from hdsim.estimate.numbers import Interval
 
 
 class FitNumber(FittedNumber):
-    """A fitted number of a model."""
+    """An estimated parameter of a model."""
 
     unit: str
     """Unit of its value, empty for a pure number."""
-    left: float | None = None
-    """Part of its prior spread that the data leave; above 0.5 they do not determine it."""
+    posterior_over_prior: float | None = None
+    """Standard deviation after the data over that before; above 0.5 it is not identifiable."""
     scales: list[str] = []
-    """Numbers of the scenario that scale together with it, itself among them."""
+    """Parameters of the scenario that scale together with it, itself among them."""
 
 
 class Correlation(Part):
-    """Correlations of the numbers that were fitted."""
+    """Correlations of the estimates."""
 
     names: list[str]
     """Names of rows and columns."""
@@ -30,14 +30,14 @@ class Correlation(Part):
 
 
 class Seen(Part):
-    """A combination of numbers, in units of their prior spreads, that the data see or not."""
+    """A combination of parameters, in units of their prior spreads, and whether it is identifiable."""
 
     spread: float
-    """Ratio of the standard deviation that is left of it to the one before the data."""
+    """Ratio of its standard deviation after the data to that before."""
     seen: bool
     """Whether the data determine it."""
     parts: dict[str, float]
-    """Numbers that take part, with their share and sign."""
+    """Parameters that take part, with their share and sign."""
 
 
 class RecordReading(Part):
@@ -46,7 +46,7 @@ class RecordReading(Part):
     record: str
     """Its name."""
     holdout: bool
-    """Whether only the proof has seen it."""
+    """Whether it is a validation record."""
     offsets: dict[str, float]
     """Measured less predicted, mean, of each channel, in SI units."""
     locked_zero_rad: float | None = None
@@ -57,15 +57,15 @@ class FitResult(Part):
     """What a fit found."""
 
     numbers: dict[str, FitNumber]
-    """Every number that was free, by its path."""
+    """Every free parameter, by its path."""
     moved: list[str]
-    """Numbers whose value in the model lies outside of their interval."""
+    """Parameters whose interval excludes the model's value."""
     correlation: Correlation
-    """Of the numbers that were fitted."""
+    """Of the estimates."""
     directions: list[Seen]
-    """What the data see and what not, the best seen first."""
+    """Identifiable and not identifiable combinations, the best determined first."""
     gap: dict[str, Gap]
-    """Held-out gap of each channel: before, and after the fit (``refit`` and ``after`` are the same)."""
+    """Held-out RMS residual of each channel, before and after the fit (``refit`` equals ``after``)."""
     records: list[RecordReading]
     """Offsets and zeros of each record."""
     data_problems: list[DataProblem] = []
@@ -99,6 +99,6 @@ def _number(interval: Interval, paths: list[str], left: float | None) -> FitNumb
         start=interval.start,
         tied_to=interval.tied_to,
         unit=interval.unit,
-        left=left,
+        posterior_over_prior=left,
         scales=paths,
     )

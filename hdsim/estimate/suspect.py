@@ -101,7 +101,7 @@ def one_way(bench: Bench) -> list[Problem]:
             channel,
             "one way",
             "info",
-            "the motion goes one way: Coulomb friction and the sensor's zero are one number in these data",
+            "the motion goes one way: Coulomb friction and the sensor's zero are confounded in these data",
         )
         for channel in bench.channels
         if channel.endswith("torque")
@@ -134,8 +134,8 @@ def moving_zeros(bench: Bench, predictions: Sequence[Array]) -> list[Problem]:
                 f"{moved[k]:+.3g} in {bench.predictors[bench.series[k].record].record.name}" for k in far[:3]
             )
             message = (
-                f"most of what is left is a constant of its own in each record ({words}): if the sensor was "
-                "zeroed between them, say --zeros record"
+                f"most of the residual is a different constant in each record ({words}): if the sensor was "
+                "zeroed between them, give --zeros record"
             )
             name = bench.predictors[bench.series[far[0]].record].record.name
             found.append(Problem(name, channel, "zero", "warning", message))

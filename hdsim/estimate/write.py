@@ -20,10 +20,10 @@ from hdsim.nested import merge, put
 #: What a scenario that a diagnosis writes is called after its base's name, and what it says of itself.
 FOUND = (
     "with what was found",
-    "Written by a diagnosis: the base, its numbers fitted to measured data, and effects.",
+    "Written by a diagnosis: the base with parameters estimated from measured data, and effects.",
 )
 #: The same of one that a fit writes.
-FITTED = ("fitted", "Written by a fit: the base with its numbers fitted to measured data.")
+FITTED = ("fitted", "Written by a fit: the base with parameters estimated from measured data.")
 
 
 def scenario_text(

@@ -122,7 +122,7 @@ def study_html(result: StudyResult) -> str:
 
 
 def diagnosis_html(diagnosis: Diagnosis) -> str:
-    """A diagnosis: verdict, how sure it is, the numbers of what was found, and the gap on unseen data."""
+    """A diagnosis: verdict, confidence, parameter estimates, and the residuals on held-out data."""
     from hdsim.tell.figures import gap_bars, gap_figure
     from hdsim.tell.findings import gather
     from hdsim.tell.wording import KINDS, headline, sureness
@@ -130,7 +130,7 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     found = gather(diagnosis)
     verdict = found.verdict
     sure = sureness(found)
-    facts = {"how sure": sure.sentence}
+    facts = {"confidence": sure.sentence}
     serious = [f"{p.record}: {p.channel} {p.message}" for p in verdict.data_problems if p.severity != "info"]
     if serious:
         facts["data"] = "; ".join(serious)
@@ -141,16 +141,16 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     ]
     moved = {name: number for name, number in verdict.parameters.items() if name in verdict.moved}
     if moved:
-        parts.append("<h4>numbers of the model that are off</h4>" + numbers_table(moved, list(moved)))
+        parts.append("<h4>parameters of the model that are wrong</h4>" + numbers_table(moved, list(moved)))
     if verdict.gap:
-        parts.append("<h4>gap on data that no fit has seen, rms</h4>")
+        parts.append("<h4>RMS residual on held-out data</h4>")
         parts.append(table(GAP_HEAD, gap_rows(verdict), range(2, len(GAP_HEAD))))
     figure = gap_figure(verdict, gap_bars(found))
     return _card(headline(found), KINDS[verdict.verdict], facts, figure, "".join(parts))
 
 
 def fit_html(found: Estimation) -> str:
-    """A fit: every number with its interval, and the gap on unseen data."""
+    """A fit: every parameter estimate with its interval, and the residuals on held-out data."""
     from hdsim.estimate.outcome import result_of
     from hdsim.tell import fit_report
     from hdsim.tell.fit_figures import intervals_figure
@@ -163,7 +163,7 @@ def fit_html(found: Estimation) -> str:
     body = numbers_table(result.numbers, result.moved)
     rows = fit_report.gap_rows(result)
     if rows:
-        body += "<h4>gap on data that the fit has not seen, rms</h4>"
+        body += "<h4>RMS residual on held-out data</h4>"
         body += table(fit_report.GAP_HEAD, rows, range(2, len(fit_report.GAP_HEAD)))
     return _card("Fit", fit_report.summary(result), facts, intervals_figure(found), body)
 

@@ -55,7 +55,7 @@ def diagnose(
         scenario: the model, or its file; what it commands does not matter, its motion is the measured one.
         mapping: of files and data frames, which column is which: a mapping's file or the same as a
             dictionary. A log of hdsim needs none.
-        holdout: records that only the proof sees; parts of ``measured`` when there are none.
+        holdout: validation records, used in no fit; parts of ``measured`` when there are none.
         load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
         force: go on in spite of errors in the data.

@@ -43,7 +43,7 @@ def subtitle(recording: Recording) -> str:
     scenario, drive = scenario_of(recording) or {}, drive_of(recording) or {}
     parts = []
     if drive:
-        parts.append(f"drive {drive.get('preset') or 'with its own numbers'}")
+        parts.append(f"drive {drive.get('preset') or 'without preset'}")
         mesh = drive.get("mesh")
         if isinstance(mesh, dict) and "model" in mesh:
             parts.append(f"{mesh['model']} mesh")

@@ -238,7 +238,7 @@ class Scenario(Parameters):
         samples = round(run.duration_s * run.sample_rate_hz)
         return {
             "scenario": f"{self.name}: {about}" if about else self.name,
-            "drive": f"{drive.preset or 'own numbers'}, ratio {drive.ratio:g}, "
+            "drive": f"{drive.preset or 'without preset'}, ratio {drive.ratio:g}, "
             f"rated torque {drive.rated_torque_nm:g} N m, {drive.mesh.model} mesh\n"
             f"K1, K2, K3 {', '.join(f'{k:.4g}' for k in stiffness)} N m/rad; motor and wave generator "
             f"{drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2:.3g} kg m^2",

@@ -47,7 +47,8 @@ def gap_rows(result: FitResult) -> list[list[str]]:
 
 def summary(result: FitResult) -> str:
     """The fit in a sentence."""
-    known = [n for n in result.numbers.values() if n.left is not None and n.left <= UNDETERMINED]
+    ratios = [n.posterior_over_prior for n in result.numbers.values()]
+    known = [ratio for ratio in ratios if ratio is not None and ratio <= UNDETERMINED]
     said = f"{len(known)} of {len(result.numbers)} parameters are identifiable from these data"
     if result.moved:
         said += f"; {len(result.moved)} {'differs' if len(result.moved) == 1 else 'differ'} from the model: "

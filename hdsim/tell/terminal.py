@@ -27,9 +27,9 @@ STEPS = {
     "locating": 35,
     "screening": 40,
     "fitting the shortlist": 55,
-    "asking each name again": 70,
+    "testing each effect again": 70,
     "fitting the curve": 75,
-    "proving": 90,
+    "validating": 90,
     "finding the next experiment": 95,
 }
 #: Narrow enough for 80 columns.

@@ -88,7 +88,7 @@ def stick_slip(_data: Path | None) -> Iterator[Row]:
     _, angle, stuck = exact_stiction(lambda t: 0.045 * np.sin(4 * np.pi * t), 1.5, 0.03, 1e-3, inertia)
     worst = int(np.argmax(np.abs(found["motor_angle"] - angle)))
     yield Row(
-        "stick-slip", "motor angle under stick and slip, where it is farthest off", "rad",
+        "stick-slip", "motor angle under stick and slip, largest deviation", "rad",
         "exact stiction from event to event, SciPy RK45 at 1e-10", float(angle[worst]),
         float(found["motor_angle"][worst]), 1e-4 * float(np.ptp(angle)),
         "1e-4 of the travel, the run's rtol", relative=False,

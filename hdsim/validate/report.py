@@ -12,7 +12,7 @@ from hdsim.validate.rows import Row, Verdict
 if TYPE_CHECKING:
     from rich.console import Console
 
-TITLE = "Held against the world"
+TITLE = "Validation"
 
 _STYLE = {Verdict.HOLDS: "green", Verdict.FAILS: "bold red", Verdict.ABSENT: "dim"}
 
@@ -37,13 +37,13 @@ def allowed(row: Row) -> str:
 
 
 def summary(rows: list[Row]) -> str:
-    """How many rows of each verdict, and how many of them set no number of the model."""
+    """How many rows of each verdict, and how many of them calibrate no parameter of the model."""
     count = Counter(row.verdict for row in rows)
     apart = Counter(row.verdict for row in rows if not row.fitted)
     absent = f", the data of {count[Verdict.ABSENT]} are absent" if count[Verdict.ABSENT] else ""
     return (
         f"{count[Verdict.HOLDS]} of {len(rows)} rows hold, {count[Verdict.FAILS]} fail{absent}; of those "
-        f"that set no number of the model {apart[Verdict.HOLDS]} hold and {apart[Verdict.FAILS]} fail"
+        f"that calibrate no parameter {apart[Verdict.HOLDS]} hold and {apart[Verdict.FAILS]} fail"
     )
 
 
@@ -60,7 +60,7 @@ def print_rows(rows: list[Row], console: Console | None = None) -> None:
     for heading in ("stated", "hdsim"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("unit")
-    for heading in ("off", "allowed"):
+    for heading in ("deviation", "allowed"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     for row in rows:
@@ -78,7 +78,9 @@ def print_rows(rows: list[Row], console: Console | None = None) -> None:
     for text, members in about.items():
         shown.print(f"{', '.join(members)}: {text}", markup=False, highlight=False)
     if any(row.fitted for row in rows):
-        shown.print("*: this value set a number of the model, which only gives it back", highlight=False)
+        shown.print(
+            "*: this value calibrated a parameter of the model, which only reproduces it", highlight=False
+        )
     shown.print(f"{TITLE}: {summary(rows)}", markup=False, highlight=False, soft_wrap=True)
 
 
@@ -99,8 +101,11 @@ def to_json(rows: list[Row]) -> str:
 
 
 def to_markdown(rows: list[Row]) -> str:
-    """The table for a page, the rows that set a number of the model marked with an asterisk."""
-    lines = ["| quantity | source | stated | hdsim | unit | off | allowed | verdict |", "|" + "---|" * 8]
+    """The table for a page, the rows that calibrate a parameter of the model marked with an asterisk."""
+    lines = [
+        "| quantity | source | stated | hdsim | unit | deviation | allowed | verdict |",
+        "|" + "---|" * 8,
+    ]
     for row in rows:
         mark = r"\*" if row.fitted else ""
         verdict = f"**{row.verdict}**" if row.verdict == Verdict.FAILS else str(row.verdict)
@@ -116,7 +121,7 @@ def to_markdown(rows: list[Row]) -> str:
         about: dict[str, list[str]] = {}
         for row in failing:
             about.setdefault(row.remark, []).append(row.name)
-        lines += ["", "About those that fail:", ""]
+        lines += ["", "The failures:", ""]
         lines += [
             f"* {', '.join(f'`{name}`' for name in members)}: {text}." for text, members in about.items()
         ]

@@ -17,9 +17,11 @@ __all__ = ["page", "reliability_picture"]
 
 #: Bands of strength: they meet at the middle, in logarithm, between the strengths that are asked for.
 BANDS = ((0.5, 1.5), (1.5, 3.5), (3.5, 10.0), (10.0, 35.0), (35.0, 100.0))
-#: Of what can be closed of the held-out gap, the share that is asked for; of cases as strong as this.
+#: Required share of the reducible held-out residual; of cases as strong as this.
 CLOSED, CLEAR = 0.9, 3.5
 LEFT_OUT = "mujoco"
+#: Outcomes as the page writes them, where that differs.
+SHOWN = {"wrong name": "wrong effect"}
 
 
 def rate(right: int, count: int) -> str:
@@ -120,43 +122,43 @@ def _measures(lines: Sequence[Line]) -> dict[str, tuple[int, int]]:
         return outcome(r) == "right"
 
     found = {
-        f"first name right, strength {low:g} to {high:g}": share(
+        f"first effect right, strength {low:g} to {high:g}": share(
             [r for r in effects if band(r) == f"{low:g} to {high:g}"], right
         )
         for low, high in BANDS
     }
-    found["wrong first name where an effect is hidden"] = share(hidden, false_name)
-    found["false alarm where nothing is hidden or a number is off"] = share(quiet, false_alarm)
-    found["a number that is off said to be"] = share([r for r in lines if r["kind"] == "parameter"], right)
+    found["wrong first effect where one is hidden"] = share(hidden, false_name)
+    found["false alarm where nothing is hidden or a parameter is wrong"] = share(quiet, false_alarm)
+    found["wrong parameter reported"] = share([r for r in lines if r["kind"] == "parameter"], right)
     found["`unknown`, outside the catalogue"] = share([r for r in lines if r["kind"] == "outside"], right)
-    found["a name, outside the catalogue"] = share(
+    found["an effect, outside the catalogue"] = share(
         [r for r in lines if r["kind"] == "outside"], lambda r: outcome(r) == "wrong name"
     )
     found["both of a pair"] = share([r for r in lines if r["kind"] == "pair"], right)
     closable = [r for r in hidden if r.get("closed") is not None and min(r["strength"]) >= CLEAR]
-    found["nine tenths of the closable held-out gap closed, strength from 3.5"] = share(
+    found["nine tenths of the reducible held-out residual explained, strength from 3.5"] = share(
         closable, lambda r: r["closed"] >= CLOSED
     )
     given = [r for r in hidden if r.get("closed_since_before") is not None and min(r["strength"]) >= CLEAR]
-    found["the same of the gap before the re-fit"] = share(
+    found["the same of the residual before the re-fit"] = share(
         given, lambda r: r["closed_since_before"] >= CLOSED
     )
     numbers = [row for r in lines for row in r.get("numbers", [])]
-    found["true number in its 95 % interval"] = (sum(row[5] for row in numbers), len(numbers))
+    found["true parameter in its 95 % interval"] = (sum(row[5] for row in numbers), len(numbers))
     found["stopped with an error"] = share(lines, lambda r: outcome(r) == "error")
     return found
 
 
 ASKED = {
-    "first name right, strength 1.5 to 3.5": ">= 85 % (at 2)",
-    "first name right, strength 3.5 to 10": ">= 95 % (at 5)",
-    "first name right, strength 35 to 100": ">= 95 % (at 50)",
-    "wrong first name where an effect is hidden": "<= 3 %",
-    "false alarm where nothing is hidden or a number is off": "<= 3 %",
+    "first effect right, strength 1.5 to 3.5": ">= 85 % (at 2)",
+    "first effect right, strength 3.5 to 10": ">= 95 % (at 5)",
+    "first effect right, strength 35 to 100": ">= 95 % (at 50)",
+    "wrong first effect where one is hidden": "<= 3 %",
+    "false alarm where nothing is hidden or a parameter is wrong": "<= 3 %",
     "`unknown`, outside the catalogue": ">= 85 %",
     "both of a pair": ">= 85 %",
-    "nine tenths of the closable held-out gap closed, strength from 3.5": ">= 90 %",
-    "true number in its 95 % interval": "90 to 98 %",
+    "nine tenths of the reducible held-out residual explained, strength from 3.5": ">= 90 %",
+    "true parameter in its 95 % interval": "90 to 98 %",
 }
 
 
@@ -170,8 +172,8 @@ def _asked(stated: Sequence[Line], others: Sequence[Line]) -> list[str]:
     for own in (stated, others):
         spent = _seconds(own)
         row += [len(spent), _spread(spent), *(["15 / - / 60"] if own is stated else [])]
-    heads = ["", "cases", "rate (95 % interval)", "asked", "calibration cases", "rate there"]
-    return ["## What is asked", "", *table(heads, [*rows, row])]
+    heads = ["", "cases", "rate (95 % interval)", "required", "calibration cases", "rate there"]
+    return ["## Requirements", "", *table(heads, [*rows, row])]
 
 
 def _seconds(lines: Sequence[Line]) -> list[float]:
@@ -190,7 +192,8 @@ def _confidence(lines: Sequence[Line]) -> list[str]:
     if not count:
         return [*text, "None is stated."]
     text += [
-        f"Expected calibration error {100 * error:.1f} points over {count} cases (asked: at most 5 over 600)."
+        f"Expected calibration error {100 * error:.1f} points over {count} cases "
+        "(required: at most 5 over 600)."
     ]
     heads = ["stated", "cases", "mean stated", "right (95 % interval)"]
     rows = [
@@ -216,8 +219,8 @@ def _by(title: str, of: Callable[[Line], str], lines: Sequence[Line]) -> list[st
     heads = [
         "",
         "one effect: cases",
-        "first name right",
-        *OUTCOMES[1:],
+        "first effect right",
+        *(SHOWN.get(name, name) for name in OUTCOMES[1:]),
         "nothing hidden: cases",
         "false alarm",
     ]
@@ -238,7 +241,7 @@ def _bands_of_families(lines: Sequence[Line]) -> list[str]:
             own = [r for r in lines if r["kind"] == "effect" and r["family"] == name and band(r) == row[0]]
             row.append(f"{rate(sum(outcome(r) == 'right' for r in own), len(own))} of {len(own)}")
         rows.append(row)
-    text = ["## First name right by strength and family", ""]
+    text = ["## First effect right by strength and family", ""]
     return text + (table(["strength", *families], rows) if families else ["None."])
 
 
@@ -275,8 +278,8 @@ def _confusion(lines: Sequence[Line]) -> list[str]:
         [*place, f"{right[place]} of {own.total()}", "; ".join(f"{w} ({n})" for w, n in own.most_common())]
         for place, own in sorted(found.items())
     ]
-    text = ["## Confusion", "", "Wrong ones in bold.", ""]
-    return text + table(["kind", "hidden", "right", "said"], rows)
+    text = ["## Confusion", "", "Wrong verdicts in bold.", ""]
+    return text + table(["kind", "hidden", "right", "verdict"], rows)
 
 
 def _failures(lines: Sequence[Line]) -> list[str]:
@@ -298,9 +301,9 @@ def _failures(lines: Sequence[Line]) -> list[str]:
                 r.get("cpu_s"),
             ]
         )
-    heads = ["key", "experiment", "strength", "said", "closed", "processor s"]
-    count = f"{len(wrong)} of {len(lines)}. One again: `python tests/blind one KEY`."
-    return ["## Every wrong answer", "", count, "", *table(heads, rows)]
+    heads = ["key", "experiment", "strength", "verdict", "share explained", "processor s"]
+    count = f"{len(wrong)} of {len(lines)}. To repeat one: `python tests/blind one KEY`."
+    return ["## Every wrong verdict", "", count, "", *table(heads, rows)]
 
 
 def _outside_intervals(lines: Sequence[Line]) -> list[str]:
@@ -310,5 +313,5 @@ def _outside_intervals(lines: Sequence[Line]) -> list[str]:
         for path, truth, value, low, high, inside in r.get("numbers", [])
         if not inside
     ]
-    heads = ["key", "field", "truth", "fitted", "95 % interval"]
-    return ["## Numbers outside their interval", "", *table(heads, rows)]
+    heads = ["key", "parameter", "truth", "estimate", "95 % interval"]
+    return ["## Parameters outside their interval", "", *table(heads, rows)]

@@ -29,7 +29,7 @@ def test_a_log_gives_verdict_scenario_report_and_log(tmp_path):
     assert result.output.startswith("parameter")
     changed = hdsim.load_scenario(out / "found.yaml").drive.friction.coulomb_nm
     assert abs(changed - 0.045) < 0.002
-    assert "Numbers of the model are off" in (out / "report.html").read_text(encoding="utf-8")
+    assert "Parameters of the model are wrong" in (out / "report.html").read_text(encoding="utf-8")
     compared = hdsim.open_log(out / "compared.mcap")
     assert {"measured", "before", "refit", "after"} <= set(compared.tables)
 

@@ -100,12 +100,12 @@ def test_the_page_of_the_diagnosis_has_the_programs_own_figures() -> None:
     text = " ".join((DOCS / "diagnose.md").read_text(encoding="utf-8").split())
     least = f"{FEWEST_SAMPLES} samples over {SHORTEST_S:g} s at {SLOWEST_HZ:g} Hz or more"
     assert f"{least}, without gaps above {LONGEST_GAP_S:g} s" in text
-    assert f"a single name below {WEAK:.0%}".replace("%", " %") in text
+    assert f"a single effect below {WEAK:.0%}".replace("%", " %") in text
     assert f"experiments of up to {LONGEST_S:g} s" in text
     very, sure, fairly = (round(100 * least) for least, _ in SURE[:3])
     assert f"very sure from {very} %, sure from {sure} %, fairly sure from {fairly} %" in text
     assert (MUCH_NOISE, MUCH_STRUCTURE) == (2.0, 0.1)
-    assert "more than twice its noise or more than a tenth of the structure" in text
+    assert "more than twice its noise or more than a tenth of the systematic residual" in text
 
 
 def test_the_page_of_the_diagnosis_has_every_field_of_the_verdict() -> None:

@@ -62,10 +62,10 @@ def test_what_is_fixed_stays_and_what_is_asked_for_moves(tmp_path):
         f"{section}.torque_t2_nm",
     ]
     for bad, message in (
-        ({"free": ["drive.friction.no_such"]}, "drive.friction.no_such: no number"),
-        ({"fix": ["load.gravity"]}, "load.gravity: no number"),
+        ({"free": ["drive.friction.no_such"]}, "drive.friction.no_such: no parameter"),
+        ({"fix": ["load.gravity"]}, "load.gravity: no parameter"),
         ({"free": [k1], "fix": [k1]}, "both free and fixed"),
-        ({"fix": [*TRUTH, *others, "motor_torque_gain"]}, "no number is left"),
+        ({"fix": [*TRUTH, *others, "motor_torque_gain"]}, "no free parameter"),
     ):
         with pytest.raises(InputError, match=message):
             hdsim.fit([record(0, 3.0)], scenario, **bad)
@@ -86,16 +86,18 @@ def test_numbers_that_stand_in_for_one_another_are_told_apart_from_those_that_ar
     assert math.prod(unseen[0].parts.values()) < 0  # one up, the other down
     assert len(result.correlation.names) == len(TRUTH)
     # The one that was fitted is known no better: the other, which stayed, might be anything.
-    assert [name for name, n in result.numbers.items() if n.left is not None and n.left > 0.5] == [
-        name for name in (arm, mass) if name != unknown[0]
-    ]
+    assert [
+        name
+        for name, n in result.numbers.items()
+        if n.posterior_over_prior is not None and n.posterior_over_prior > 0.5
+    ] == [name for name in (arm, mass) if name != unknown[0]]
 
 
 def test_a_sensitivity_that_only_its_prior_bounds_is_not_called_determined(tmp_path):
     # Every torque of the model over the sensor's sensitivity: only products are measured.
     result = result_of(hdsim.fit([record(0, 4.0)], model(tmp_path)))
     gain = result.numbers["motor_torque_gain"]
-    assert gain.left is None or gain.left > 0.5
+    assert gain.posterior_over_prior is None or gain.posterior_over_prior > 0.5
     assert "drive.inertia.motor_kg_m2" in gain.tied_to  # the widest of what it would stand in for
     for name, true in TRUTH.items():
         low, high = result.numbers[name].interval
@@ -117,7 +119,7 @@ def test_what_is_written_runs_and_reads_back(tmp_path):
     assert fitted.load.gravity.mass_kg == pytest.approx(4.4, rel=0.03)
     assert result.numbers["load.gravity.mass_kg"].unit == "kg"
     assert result.gap["motor_torque"].after < result.gap["motor_torque"].before
-    for said in ("differ from the model", "kg m²", "What these data tell", "load, gravity, mass"):
+    for said in ("differ from the model", "kg m²", "Identifiability", "load, gravity, mass"):
         assert said in page
     assert page.count("<img") == 3
     names = {path.name for path in out.iterdir()}

@@ -25,7 +25,7 @@ def ask(tmp_path, capsys):
 def test_a_log_gives_numbers_page_and_scenario(ask, tmp_path):
     code, out, err = ask("--out", str(tmp_path / "out"), "--fix", "motor_torque_gain")
     assert code == 0, err
-    assert "numbers are determined by these data" in out
+    assert "parameters are identifiable from these data" in out
     for word in ("load, gravity, mass", "95 % interval", "after/noise", "fit.html", "fitted.yaml"):
         assert word in out
     assert (tmp_path / "out" / "fit.html").exists()
@@ -34,8 +34,8 @@ def test_a_log_gives_numbers_page_and_scenario(ask, tmp_path):
 @pytest.mark.parametrize(
     ("more", "where", "message"),
     [
-        (["--free", "drive.frction.coulomb_nm"], {}, "drive.frction.coulomb_nm: no number of this model"),
-        (["--apart", "load.inertia"], {}, "load.inertia: no number of this model"),
+        (["--free", "drive.frction.coulomb_nm"], {}, "drive.frction.coulomb_nm: no parameter of this model"),
+        (["--apart", "load.inertia"], {}, "load.inertia: no parameter of this model"),
         (["--load", "load_torque"], {}, "the load is to come from load_torque, which is not measured"),
         ([], {"data": "none.mcap"}, "none.mcap"),
         ([], {"scenario": "bad.yaml"}, "bad.yaml"),

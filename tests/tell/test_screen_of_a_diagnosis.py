@@ -27,7 +27,7 @@ def test_the_bar_never_goes_back_and_is_silent_off_a_terminal(capsys):
     bar = Progress(Console(stderr=True, force_terminal=True))
     with bar as tell:
         done = []
-        for text in ("checking the data", "screening the catalogue", "locating what is left", "[odd] detail"):
+        for text in ("checking the data", "screening the catalogue", "locating the residual", "[odd] detail"):
             tell(text)
             done.append(bar._done)
     assert done == sorted(done)

@@ -38,7 +38,7 @@ def test_a_row_is_judged_by_its_tolerance() -> None:
 def test_the_summary_counts_apart_what_set_a_number() -> None:
     rows = [made(1, 1, 0.1), made(1, 1, 0.1, fitted=True), made(1, 2, 0.1), made(1, math.nan, 0.1)]
     assert summary(rows) == (
-        "2 of 4 rows hold, 1 fail, the data of 1 are absent; of those that set no number of the model 1 hold "
+        "2 of 4 rows hold, 1 fail, the data of 1 are absent; of those that calibrate no parameter 1 hold "
         "and 1 fail"
     )
 
