@@ -203,7 +203,7 @@ class Table(Effect):
 
     title: ClassVar[str] = "tabulated curve"
     source: ClassVar[str] = (
-        "none: a measured curve without a name; interpolation: de Boor 2001, A Practical Guide to Splines, "
+        "none: the curve of an unidentified effect; interpolation: de Boor 2001, A Practical Guide to Splines, "
         "ch. IV; the default, the pull of a cable loop, is an estimate"
     )
     signature: ClassVar[Signature] = Signature(

@@ -102,7 +102,7 @@ def lara8(data: Path | None) -> Iterator[Row]:
     yield Row(
         "lara8-weight", "LARA8 joint 3: torque of the arm's weight", "N m",
         "NumPy: least squares of the torque over sine and cosine of the angle at constant speed",
-        regressed, weight, 0.05, "the regression leaves inertia and wind-up out (estimate)",
+        regressed, weight, 0.05, "the regression neglects inertia and wind-up (estimate)",
     )  # fmt: skip
 
 
@@ -156,7 +156,7 @@ def kinova(data: Path | None) -> Iterator[Row]:
         yield Row(
             f"kinova-{joint}-friction", f"Kinova Gen3 joint {joint}: friction{at}", "N m",
             "NumPy: motor torque less sensor torque over speed, its sign and acceleration",
-            stated, ours, 0.15, "masks, smoothing and what is left free differ (estimate)",
+            stated, ours, 0.15, "masks, smoothing and free parameters differ (estimate)",
         )  # fmt: skip
 
 

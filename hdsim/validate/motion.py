@@ -22,7 +22,7 @@ _PEERS = {
         "hdsim's rtol 1e-7 and 4 kHz",
     ),
     "mujoco": ("MuJoCo, RK4 at 25 µs, the same contact", 2e-3, "hdsim's rtol 1e-7 and 4 kHz"),
-    "balance": (_GELB, 0.10, "harmonics are left out (estimate)"),
+    "balance": (_GELB, 0.10, "harmonics are neglected (estimate)"),
 }
 
 

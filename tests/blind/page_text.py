@@ -52,8 +52,8 @@ encoders, a torque sensor in addition, or a known torque on the output; temperat
 are stretches, or ({100 * FILES_SHARE:.0f} %) one or two separate files with other motions and speeds. Time
 stamps jitter in {100 * JITTER_SHARE:.0f} %; where an effect is hidden, parameters of the base are wrong by 5
 to 20 % as well in {100 * OFF_SHARE:.0f} %. Six sizes of drive (14 to 40, ratios -160 to -50 and +101) whose
-inertia, stiffness and friction are 0.6 to 1.7 times the size's; six kinds of motion, one of them ramps against a
-locked output.
+inertia, stiffness and friction are 0.6 to 1.7 times the size's; six kinds of motion, one of them ramps
+against a locked output.
 
 **Strength** is the root mean square of the change that the effect makes, over the noise of its channel
 (quantisation included; of the transmission error for the two angles), in the channel where it is largest,

@@ -184,12 +184,12 @@ def test_the_page_states_odd_seeds_and_the_family_left_out_alone(tmp_path):
     rows = {
         row.split(" | ")[0].strip("| "): row.split(" | ") for row in text.splitlines() if row.startswith("|")
     }
-    five = rows["first name right, strength 3.5 to 10"]
+    five = rows["first effect right, strength 3.5 to 10"]
     assert five[1] == "9"
     assert five[2].startswith("89 %")
     assert five[4] == "3"
-    assert rows["wrong first name where an effect is hidden"][2].startswith("10 %")
-    assert "2 of 10. One again" in text
+    assert rows["wrong first effect where one is hidden"][2].startswith("10 %")
+    assert "2 of 10. To repeat one" in text
     picture(lines, tmp_path / "images" / "reliability.png")
     assert (tmp_path / "images" / "reliability.png").stat().st_size > 5000
 
