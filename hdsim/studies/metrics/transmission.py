@@ -92,9 +92,9 @@ def transmission_error(recording: Recording, ratio: float, direction: int) -> Tr
 
 #: Transmission errors of recordings that somebody still holds, by ratio and direction, and what they were
 #: taken from: several metrics ask for the same.
-_kept: WeakKeyDictionary[
-    Recording, dict[tuple[float, int], tuple[tuple[Array, ...], TransmissionError]]
-] = WeakKeyDictionary()
+_kept: WeakKeyDictionary[Recording, dict[tuple[float, int], tuple[tuple[Array, ...], TransmissionError]]] = (
+    WeakKeyDictionary()
+)
 
 
 def _transmission_error(recording: Recording, ratio: float, direction: int) -> TransmissionError:
