@@ -67,7 +67,7 @@ class Event:
     message: str
 
 
-@dataclass
+@dataclass(eq=False)  # one is itself alone, so that what was computed of it can be kept beside it
 class Recording:
     """A run: tables by name (``state`` at full rate, ``teeth`` at its own), static arrays, events, metadata.
 

@@ -8,7 +8,8 @@ asks it for rows over w and adds and multiplies them with ``control`` systems.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from hdsim.errors import InputError
@@ -90,6 +91,9 @@ class Loop:
 class Law(Protocol):
     """A controller that can be written as a linear system."""
 
+    def model_dump(self) -> dict[str, Any]:
+        """Its numbers by name; controllers of one class with the same ones are the same."""
+
     def system(self, loop: Loop) -> Any:
         """Its ``control.StateSpace`` from w to the motor torque."""
 
@@ -146,13 +150,35 @@ def canonical_controller(law: Law, loop: Loop) -> CanonicalController:
         law: the controller.
         loop: where it is closed.
 
+    Returns:
+        The form, kept for controllers of the same numbers; its arrays are read-only.
+
     Raises:
         InputError: the controller asks for an input that there is not.
     """
+    return _kept(_Given(law, type(law), repr(law.model_dump()), loop))
+
+
+@dataclass(frozen=True)
+class _Given:
+    """A controller and its loop; alike where kind and numbers are."""
+
+    law: Law = field(compare=False)
+    kind: type[Law]
+    numbers: str
+    loop: Loop
+
+
+@lru_cache(maxsize=256)
+def _kept(given: _Given) -> CanonicalController:
+    """The form of a controller: ``control`` takes milliseconds, and drives side by side share controllers."""
     import numpy as np
 
-    system = law.system(loop)
-    A, B = np.asarray(system.A, dtype=float), np.asarray(system.B, dtype=float)
-    C, D = np.asarray(system.C, dtype=float).ravel(), np.asarray(system.D, dtype=float).ravel()
+    system = given.law.system(given.loop)
+    A, B = np.array(system.A, dtype=float), np.array(system.B, dtype=float)
+    C, D = np.array(system.C, dtype=float).ravel(), np.array(system.D, dtype=float).ravel()
     integrators = ~A.any(axis=0) & ~A.any(axis=1) & (C != 0.0)
-    return CanonicalController(A, B, C, D, law.tracking_gain(C, integrators), integrators)
+    found = CanonicalController(A, B, C, D, np.array(given.law.tracking_gain(C, integrators)), integrators)
+    for values in (found.A, found.B, found.C, found.D, found.L, found.integrators):
+        values.setflags(write=False)
+    return found

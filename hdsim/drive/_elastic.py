@@ -138,7 +138,7 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     fill_inputs(
         t, integers, scratch, -result[_mesh_layout.GRADIENT + 2], twist, twist_rate, mesh_twist, mesh_rate
     )
-    run_elements(integers, reals, scratch)
+    run_elements(integers, reals, scratch, want_jacobian)
 
     columns = integers[COLUMNS]
     rows = OWN + integers[OWN_STATES]

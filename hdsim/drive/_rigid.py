@@ -94,7 +94,7 @@ def evaluate_rigid(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, 
     gradient = 1.0
     for _ in range(20):
         fill_inputs(t, integers, scratch, tau, 0.0, 0.0, 0.0, 0.0)
-        run_elements(integers, reals, scratch)
+        run_elements(integers, reals, scratch, 1)
         gradient = 1.0 + full[OUTPUT_TORQUE * columns + TRANSMITTED_TORQUE]
         if free:
             alpha = (outputs[MOTOR_TORQUE] + c * outputs[OUTPUT_TORQUE] - j_o * c * bend * vm * vm) / total

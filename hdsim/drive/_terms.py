@@ -130,8 +130,11 @@ def fill_inputs(t, integers, scratch, transmitted, twist, twist_rate, mesh_twist
 
 
 @_jit
-def run_elements(integers, reals, scratch):  # type: ignore[no-untyped-def]
-    """Clear outputs and Jacobian, then let each element add to them; keeps the least heat of an account."""
+def run_elements(integers, reals, scratch, want_jacobian):  # type: ignore[no-untyped-def]
+    """Clear outputs and Jacobian, then let each element add to them; keeps the least heat of an account.
+
+    Without the Jacobian wanted, what the elements add to it is left to pile up: nobody reads it.
+    """
     columns = integers[COLUMNS]
     rows = OWN + integers[OWN_STATES]
     at = S_INPUTS + columns
@@ -140,7 +143,8 @@ def run_elements(integers, reals, scratch):  # type: ignore[no-untyped-def]
     jacobian = scratch[at + rows : at + rows + rows * columns]
     heats = scratch[at + rows + rows * columns :]
     outputs[:] = 0.0
-    jacobian[:] = 0.0
+    if want_jacobian != 0:
+        jacobian[:] = 0.0
     accounts = integers[ACCOUNTS]
     for k in range(accounts):
         heats[k] = 0.0

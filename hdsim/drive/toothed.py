@@ -110,6 +110,7 @@ class Teeth:
         header[place.LARGEST_PITCH_ERROR] = float(np.max(np.abs(self.pitch_errors_m)))
         self._blocks: list[Array] = [header]
         self._length = place.HEADER
+        self._so_far = np.zeros(0)
         self._header = header
         self._place_contact()
         self._place_gaps(seed)
@@ -233,9 +234,12 @@ class Teeth:
 
     def torque(self, twist: float) -> tuple[float, float]:
         """Mean over the wave generator's angle of mesh torque (N m) and engaged share at a twist (rad)."""
-        parameters = np.concatenate(self._blocks)
+        # Called hundreds of times while the drive is built: the numbers so far are put together once.
+        if len(self._so_far) != self._length:
+            self._so_far = np.concatenate(self._blocks)
+        self._so_far[: place.HEADER] = self._header
         angles = np.arange(PROBES) * np.pi / PROBES * (1 + 1 / self.count)
-        samples = _teeth.potentials(parameters, self.lever_m * twist, angles)
+        samples = _teeth.potentials(self._so_far, self.lever_m * twist, angles)
         return float(samples[:, 1].mean() * self.lever_m), float(samples[:, 6].mean() / self.count)
 
     def loaded(self, torque_nm: float) -> tuple[float, float]:

@@ -11,6 +11,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -33,6 +35,17 @@ Given = TypeVar("Given")
 
 #: Runs side by side in threads when nothing else is said.
 THREADS = min(4, os.cpu_count() or 1)
+_threads: ContextVar[int] = ContextVar("threads", default=THREADS)
+
+
+@contextmanager
+def in_threads(count: int) -> Iterator[None]:
+    """While this lasts, so many runs are made side by side where nothing else is said."""
+    before = _threads.set(count)
+    try:
+        yield
+    finally:
+        _threads.reset(before)
 
 
 class InProcess(Executor):
@@ -83,9 +96,15 @@ def as_completed(
             future.cancel()
 
 
-def in_order(function: Callable[[Given], T], items: Sequence[Given], threads: int = THREADS) -> list[T]:
-    """Results of a function for all items, which are worked on side by side in threads."""
-    threads = min(threads, len(items))
+def in_order(function: Callable[[Given], T], items: Sequence[Given], threads: int | None = None) -> list[T]:
+    """Results of a function for all items, which are worked on side by side in threads.
+
+    Args:
+        function: what is done; what it computes must not depend on the thread.
+        items: each is worked on once.
+        threads: how many; when None as many as ``in_threads`` said, or as there are cores, up to four.
+    """
+    threads = min(_threads.get() if threads is None else threads, len(items))
     if threads < 2:
         return [function(item) for item in items]
     with ThreadPoolExecutor(threads) as pool:
@@ -97,7 +116,7 @@ def simulate_all(
     scenarios: Sequence[Scenario],
     channels: Sequence[str],
     *,
-    threads: int = THREADS,
+    threads: int | None = None,
     pool: Executor | None = None,
 ) -> list[dict[str, Array]]:
     """Simulate many scenarios and keep some channels of each.
@@ -107,7 +126,7 @@ def simulate_all(
     Args:
         scenarios: what to simulate.
         channels: names of channels of the state table.
-        threads: runs at the same time.
+        threads: runs at the same time; when None as many as there are cores, up to four.
         pool: an executor that makes them instead (processes, a Dask client's), ``threads`` at a time.
 
     Returns:
@@ -121,7 +140,8 @@ def simulate_all(
         return in_order(partial(_channels, channels=tuple(channels)), scenarios, threads)
     # As plain data: classes of a scenario's sections are made as they are needed, and cannot be pickled.
     data = (scenario.model_dump(mode="json") for scenario in scenarios)
-    found = dict(as_completed(partial(_channels_of, channels=tuple(channels)), data, pool, threads))
+    width = _threads.get() if threads is None else threads
+    found = dict(as_completed(partial(_channels_of, channels=tuple(channels)), data, pool, width))
     return [found[index] for index in range(len(scenarios))]
 
 

@@ -170,8 +170,10 @@ def budget(
     from hdsim.studies.engine.execute import executor
 
     loaded = hdsim.load_scenario(scenario)
-    with executor(workers, scheduler) as (pool, _), counter("budget") as on_progress:
-        found = error_budget(loaded, metric=metric, orders=orders, pool=pool, on_progress=on_progress)
+    with executor(workers, scheduler) as (pool, width), counter("budget") as on_progress:
+        found = error_budget(
+            loaded, metric=metric, orders=orders, pool=pool, width=width, on_progress=on_progress
+        )
     _tell_budget(found)
     stem = (Path("results") if output is None else output) / f"{scenario.stem}-budget"
     click.echo(f"wrote   {found.write_csv(stem.with_suffix('.csv'))}")

@@ -7,6 +7,7 @@ Majumdar and Bhushan (1990), J. Tribology 112:205, and Yan and Komvopoulos (1998
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -101,7 +102,20 @@ def wm_profile(
     amplitude = length_m * (G_m / length_m) ** (D - 2.0) * math.sqrt(math.log(gamma))
     a_cos = amplitude * gamma ** ((D - 3.0) * n) * np.cos(phi)
     a_sin = amplitude * gamma ** ((D - 3.0) * n) * np.sin(phi)
-    # cos(w x - phi) = cos(w x) cos(phi) + sin(w x) sin(phi): two matrix products for all teeth. With
-    # 1 - cos(w x) = 2 sin^2(w x / 2) small heights near x = 0 don't cancel.
-    angle = 2.0 * math.pi * gamma ** n[:, None] * (x / length_m)
-    return np.asarray(a_cos @ (2.0 * np.sin(angle / 2.0) ** 2) - a_sin @ np.sin(angle))
+    # cos(w x - phi) = cos(w x) cos(phi) + sin(w x) sin(phi): two matrix products for all teeth.
+    risen, sines = _waves((x / length_m).tobytes(), len(n), gamma)
+    return np.asarray(a_cos @ risen - a_sin @ sines)
+
+
+@lru_cache(maxsize=8)
+def _waves(places: bytes, frequencies: int, gamma: float) -> tuple[Array, Array]:
+    """1 - cos(w x) and sin(w x) of all waves at places x / L, shape (frequencies, points) each; read-only.
+
+    Kept: drives that differ in their phases alone share them.
+    """
+    angle = 2.0 * math.pi * gamma ** np.arange(frequencies)[:, None] * np.frombuffer(places)
+    # As 2 sin^2(w x / 2), so that small heights near x = 0 don't cancel.
+    risen, sines = 2.0 * np.sin(angle / 2.0) ** 2, np.sin(angle)
+    risen.setflags(write=False)
+    sines.setflags(write=False)
+    return risen, sines

@@ -19,6 +19,14 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 _DATA = click.Path(exists=True, path_type=Path)
 
 
+def _in_threads(context: click.Context, _: click.Parameter, count: int | None) -> None:
+    """Simulate in so many threads until the command has ended."""
+    from hdsim.simulation.ensemble import in_threads
+
+    if count is not None:
+        context.with_resource(in_threads(count))
+
+
 def measured_options(command: F) -> F:
     """The argument and the options of a command that compares a model with measured records."""
     for option in reversed(
@@ -47,6 +55,13 @@ def measured_options(command: F) -> F:
                 help="Whether a torque sensor has one zero in all records, or one in each [campaign].",
             ),
             click.option("--force", is_flag=True, help="Continue in spite of errors in the data."),
+            click.option(
+                "--threads",
+                type=click.IntRange(1),
+                expose_value=False,
+                callback=_in_threads,
+                help="Simulations at the same time [one a core, up to 4]; the numbers are the same.",
+            ),
             click.option(
                 "--black-box",
                 is_flag=True,

@@ -1,6 +1,7 @@
 """Runs side by side: bit for bit the runs alone, on any executor."""
 
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import hdsim
 from hdsim.errors import InputError
 from hdsim.scenario import Scenario
-from hdsim.simulation.ensemble import InProcess, as_completed, in_order, record_at_once
+from hdsim.simulation.ensemble import InProcess, as_completed, in_order, in_threads, record_at_once
 from hdsim.simulation.run import RunFailed
 from hdsim.simulation.setup import build_run
 
@@ -132,3 +133,16 @@ def test_order_is_kept_and_errors_are_raised():
     assert in_order(str, []) == []
     with pytest.raises(ZeroDivisionError):
         list(as_completed(lambda k: 1 / k, [1, 0, 2], InProcess(), 1))
+
+
+def test_as_many_threads_work_as_are_said():
+    def here(_):
+        time.sleep(0.01)
+        return threading.get_ident()
+
+    with in_threads(1):
+        assert set(in_order(here, range(6))) == {threading.get_ident()}
+    with in_threads(3):
+        found = set(in_order(here, range(12)))
+        assert 1 < len(found) <= 3
+        assert threading.get_ident() not in found

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import copy
 import csv
-import itertools
 import json
 import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import HdsimError, InputError
-from hdsim.simulation.ensemble import InProcess
+from hdsim.simulation.ensemble import InProcess, as_completed
 from hdsim.studies.engine.causes import Cause, causes
 from hdsim.studies.engine.shapley import (
     MOST_EXACT,
@@ -128,6 +128,7 @@ def error_budget(
     shares: bool = True,
     orders: int = 16,
     pool: Executor | None = None,
+    width: int = 1,
     on_progress: Callable[[int, int], object] | None = None,
 ) -> Budget:
     """Split an error of a scenario into its causes.
@@ -140,6 +141,7 @@ def error_budget(
         shares: find Shapley's shares: exactly, from all combinations, of up to six causes.
         orders: number of random orders from which the shares of more causes are estimated, two at least.
         pool: where the runs are made; in this process when None.
+        width: runs at the same time.
         on_progress: called with the number of runs that are done and of all runs.
 
     Raises:
@@ -165,14 +167,11 @@ def error_budget(
     reference = whole_run["reference_angle"] if "reference_angle" in whole_run else None  # noqa: SIM401
     error, unit, dwell = _chosen(whole_run, metric)
     values = {everything: _value(whole_run, prepared, error, dwell, everything)}
-    pool = pool or InProcess()
-    done = itertools.count(2)
-    futures = {}
-    for s in sets[1:]:
-        futures[s] = pool.submit(_error, text, s, error, dwell, reference)
+    simulated = partial(_error, text, error=error, dwell=dwell, reference=reference)
+    for done, (index, value) in enumerate(as_completed(simulated, sets[1:], pool or InProcess(), width), 2):
+        values[sets[1 + index]] = value
         if on_progress is not None:
-            futures[s].add_done_callback(lambda _: on_progress(next(done), len(sets)))
-    values |= {s: future.result() for s, future in futures.items()}
+            on_progress(done, len(sets))
     whole, rest = values[everything], values[nothing]
     by_name = shapley_shares(names, values, drawn) if shares else {}
     parts = [

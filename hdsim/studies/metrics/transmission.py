@@ -6,6 +6,7 @@ import contextlib
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +81,24 @@ def transmission_error(recording: Recording, ratio: float, direction: int) -> Tr
     Raises:
         InputError: the output does not turn once that way at a steady speed.
     """
+    channels = tuple(recording[name] for name in ("motor_angle", "motor_velocity", "output_angle"))
+    kept = _kept.setdefault(recording, {})
+    before = kept.get((ratio, direction))
+    # Only for the very same samples: tables of a recording may be changed.
+    if before is None or any(now is not then for now, then in zip(channels, before[0], strict=True)):
+        before = kept[ratio, direction] = channels, _transmission_error(recording, ratio, direction)
+    return before[1]
+
+
+#: Transmission errors of recordings that somebody still holds, by ratio and direction, and what they were
+#: taken from: several metrics ask for the same.
+_kept: WeakKeyDictionary[Recording, dict[tuple[float, int], tuple[tuple[Array, ...], TransmissionError]]] = (
+    WeakKeyDictionary()
+)
+
+
+def _transmission_error(recording: Recording, ratio: float, direction: int) -> TransmissionError:
+    """Compute it."""
     from scipy.interpolate import CubicSpline
 
     part = one_way_turn(recording, ratio, direction)
