@@ -42,6 +42,8 @@ class Model(Contributed):
         seed: seed of the random tooth surfaces and of all noise.
         audited: the energies supplied, delivered and dissipated are states, and every part's heat has its
             account: what the energy audit needs.
+        table_for: of a toothed mesh, ``Teeth.fingerprint`` of the teeth whose table serves for their sum; as
+            the drive's mesh says when None.
 
     Attributes:
         system: the ODE, a ``hdsim.system.System``.
@@ -61,8 +63,10 @@ class Model(Contributed):
         signals: Mapping[str, Any] | None = None,
         seed: int = 0,
         audited: bool = True,
+        table_for: str | None = None,
     ) -> None:
         super().__init__()
+        self._table_for = table_for
         self.drive = drive
         self.audited = audited
         self.parts = tuple(parts)
@@ -121,7 +125,7 @@ class Model(Contributed):
 
     def _mesh_parameters(self) -> tuple[Kernel | None, Array]:
         """The mesh kernel and its numbers."""
-        from hdsim.drive import _mesh, _mesh_layout, spring, toothed
+        from hdsim.drive import _mesh, _mesh_layout, kept_teeth, spring
 
         mesh = self.drive.mesh
         if isinstance(mesh, RigidMesh):
@@ -137,14 +141,15 @@ class Model(Contributed):
             parameters[_mesh_layout.SPRING_CELLS] = len(cells)
             parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER
             return _mesh.lumped_mesh, np.concatenate([parameters, cells.ravel()])
-        self.teeth = toothed.Teeth(
+        self.teeth = kept_teeth.teeth_of(
             self.drive,
             mesh,
             self._given.wind_ups,
             extra_half_gap_rad=self._given.half_gap_rad,
             seed=self.seed,
+            table_for=self._table_for,
         )
-        kernel = _mesh.table_mesh if isinstance(mesh, TabulatedMesh) else _mesh.teeth_mesh
+        kernel = _mesh.table_mesh if isinstance(self.teeth.mesh, TabulatedMesh) else _mesh.teeth_mesh
         return kernel, self.teeth.parameters
 
     @property
@@ -252,6 +257,22 @@ class Model(Contributed):
             quadratures=energies,
             scale=scale,
         )
+
+    @property
+    def seen_scale(self) -> Array:
+        """Sizes at which errors of the states matter where nobody looks at the ring itself, shape (states,).
+
+        A ring's speed counts by what it does to its own twist: at that twist's size, it is the speed of its
+        own mode, sqrt(K3 / ring's inertia), some hundred times that of the load's mode. Held to the load's,
+        it sets the step: teeth that touch and part stir the ring's speed, but no twist and no torque.
+        """
+        found = self.system.scale.copy()
+        if "ring" in self.place_of:
+            at, torsion = self.place_of["ring"], self.drive.torsion
+            own = self.drive.inertia.ring_kg_m2
+            own_speed = found[at] * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / own))
+            found[at + 1] = max(found[at + 1], own_speed)
+        return found
 
     def _is_free(self, name: str) -> bool:
         if name in self.motions:
