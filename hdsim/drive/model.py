@@ -142,6 +142,7 @@ class Model(Contributed):
             mesh,
             self._given.wind_ups,
             extra_half_gap_rad=self._given.half_gap_rad,
+            odd_teeth=self._given.odd_teeth,
             seed=self.seed,
         )
         kernel = _mesh.table_mesh if isinstance(mesh, TabulatedMesh) else _mesh.teeth_mesh

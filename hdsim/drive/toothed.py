@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from hdsim.contact.parameters import ContactParameters, TableLawParameters
 from hdsim.drive import _mesh_layout as place
 from hdsim.drive import _teeth, _teeth_table, spring
+from hdsim.drive.odd_teeth import farthest_push, odd_numbers
 from hdsim.drive.parameters import ClearanceEngagement, Drive, TabulatedMesh, ToothedMesh, WindowEngagement
 from hdsim.errors import PhysicsError
 
 if TYPE_CHECKING:
     from hdsim.contact.kernel_table import ContactTable
     from hdsim.contact.law import ContactLaw
+    from hdsim.parts import OddTooth
     from hdsim.surface.flank import Flank
 
 Array = NDArray[np.float64]
@@ -65,6 +67,7 @@ class Teeth:
         wind_ups: springs that effects put in series, torque (N m) to twist (rad) at the output.
         extra_half_gap_rad: half-gap beyond the surfaces' (wear), or less than theirs (preload), rad at the
             output.
+        odd_teeth: teeth that differ; the catalogue's stiffness is that of the drive without them.
         seed: seed of surfaces and pitch errors.
 
     Attributes:
@@ -84,6 +87,7 @@ class Teeth:
         *,
         extra_half_gap_rad: float,
         seed: int,
+        odd_teeth: Sequence[OddTooth] = (),
     ) -> None:
         self.drive = drive
         self.mesh = mesh
@@ -123,6 +127,9 @@ class Teeth:
         header[place.EXTRA_GAP] = extra_gap
         if isinstance(mesh, TabulatedMesh):
             self._place_table(mesh)
+        numbers = odd_numbers(odd_teeth, geometry)
+        header[place.ODD_COUNT], header[place.ODD_AT] = len(numbers), self._place(numbers)
+        header[place.LARGEST_PITCH_ERROR] += farthest_push(odd_teeth)
         self.parameters = np.concatenate(self._blocks)
 
     def _place(self, values: Array) -> int:
