@@ -121,7 +121,8 @@ class Model(Contributed):
 
     def _mesh_parameters(self) -> tuple[Kernel | None, Array]:
         """The mesh kernel and its numbers."""
-        from hdsim.drive import _mesh, _mesh_layout, spring, toothed
+        from hdsim.drive import _mesh, _mesh_layout, kept_teeth, spring
+        from hdsim.drive.odd_teeth import with_odd_teeth
 
         mesh = self.drive.mesh
         if isinstance(mesh, RigidMesh):
@@ -137,14 +138,14 @@ class Model(Contributed):
             parameters[_mesh_layout.SPRING_CELLS] = len(cells)
             parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER
             return _mesh.lumped_mesh, np.concatenate([parameters, cells.ravel()])
-        self.teeth = toothed.Teeth(
+        self.teeth = kept_teeth.teeth_of(
             self.drive,
             mesh,
             self._given.wind_ups,
             extra_half_gap_rad=self._given.half_gap_rad,
-            odd_teeth=self._given.odd_teeth,
             seed=self.seed,
         )
+        self.teeth = with_odd_teeth(self.teeth, self._given.odd_teeth)
         kernel = _mesh.table_mesh if isinstance(mesh, TabulatedMesh) else _mesh.teeth_mesh
         return kernel, self.teeth.parameters
 
@@ -253,6 +254,22 @@ class Model(Contributed):
             quadratures=energies,
             scale=scale,
         )
+
+    @property
+    def seen_scale(self) -> Array:
+        """Sizes at which errors of the states matter where nobody looks at the ring itself, shape (states,).
+
+        A ring's speed counts by what it does to its own twist: at that twist's size, it is the speed of its
+        own mode, sqrt(K3 / ring's inertia), some hundred times that of the load's mode. Held to the load's,
+        it sets the step: teeth that touch and part stir the ring's speed, but no twist and no torque.
+        """
+        found = self.system.scale.copy()
+        if "ring" in self.place_of:
+            at, torsion = self.place_of["ring"], self.drive.torsion
+            own = self.drive.inertia.ring_kg_m2
+            own_speed = found[at] * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / own))
+            found[at + 1] = max(found[at + 1], own_speed)
+        return found
 
     def _is_free(self, name: str) -> bool:
         if name in self.motions:

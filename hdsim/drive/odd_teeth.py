@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdsim.drive import _mesh_layout as place
 
 if TYPE_CHECKING:
-    from hdsim.drive.parameters import Geometry
+    from hdsim.drive.toothed import Teeth
     from hdsim.parts import OddTooth
 
 #: Share of an error below which a tooth has none of it.
 NO_SHARE = 1e-9
 
 
-def odd_numbers(odd_teeth: Sequence[OddTooth], geometry: Geometry) -> NDArray[np.float64]:
-    """Each as the two teeth next to its number, with their shares of it, shape (n, ``PER_ODD``)."""
-    rows = []
+def with_odd_teeth(teeth: Teeth, odd_teeth: Sequence[OddTooth]) -> Teeth:
+    """The same teeth but for some; the catalogue's stiffness stays that of the drive without them.
+
+    Args:
+        teeth: as drawn; left as they are.
+        odd_teeth: each is written as the two teeth next to its number, with their shares of it.
+    """
+    if not odd_teeth:
+        return teeth
+    found, rows = copy(teeth), []
+    geometry = teeth.drive.geometry
     for odd in odd_teeth:
         circular = odd.member == "circular_spline"
         count = geometry.circular_spline_teeth if circular else geometry.flexspline_teeth
@@ -30,9 +38,11 @@ def odd_numbers(odd_teeth: Sequence[OddTooth], geometry: Geometry) -> NDArray[np
         for tooth, share in ((first, 1.0 - beyond), (first + 1, beyond)):
             if share > NO_SHARE:
                 rows.append([float(circular), float(tooth % count), share, odd.shift_m, odd.widened_m])
-    return np.array(rows, dtype=float).reshape(-1, place.PER_ODD)
-
-
-def farthest_push(odd_teeth: Sequence[OddTooth]) -> float:
-    """How far odd teeth may push the ring without a twist, m."""
-    return max((max(abs(odd.shift_m), -odd.widened_m) for odd in odd_teeth), default=0.0)
+    found.parameters = np.concatenate([teeth.parameters, np.ravel(rows)])
+    found.parameters[place.ODD_COUNT] = len(rows)
+    found.parameters[place.ODD_AT] = len(teeth.parameters)
+    # How far a tooth may push the ring without a twist.
+    found.parameters[place.LARGEST_PITCH_ERROR] += max(
+        max(abs(odd.shift_m), -odd.widened_m) for odd in odd_teeth
+    )
+    return found

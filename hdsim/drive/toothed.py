@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from hdsim.contact.parameters import ContactParameters, TableLawParameters
 from hdsim.drive import _mesh_layout as place
-from hdsim.drive import _teeth, _teeth_table, spring
-from hdsim.drive.odd_teeth import farthest_push, odd_numbers
+from hdsim.drive import _teeth, spring
 from hdsim.drive.parameters import ClearanceEngagement, Drive, TabulatedMesh, ToothedMesh, WindowEngagement
+from hdsim.drive.tabulated import potential_table
 from hdsim.errors import PhysicsError
 
 if TYPE_CHECKING:
     from hdsim.contact.kernel_table import ContactTable
     from hdsim.contact.law import ContactLaw
-    from hdsim.parts import OddTooth
     from hdsim.surface.flank import Flank
 
 Array = NDArray[np.float64]
@@ -67,7 +66,6 @@ class Teeth:
         wind_ups: springs that effects put in series, torque (N m) to twist (rad) at the output.
         extra_half_gap_rad: half-gap beyond the surfaces' (wear), or less than theirs (preload), rad at the
             output.
-        odd_teeth: teeth that differ; the catalogue's stiffness is that of the drive without them.
         seed: seed of surfaces and pitch errors.
 
     Attributes:
@@ -87,7 +85,6 @@ class Teeth:
         *,
         extra_half_gap_rad: float,
         seed: int,
-        odd_teeth: Sequence[OddTooth] = (),
     ) -> None:
         self.drive = drive
         self.mesh = mesh
@@ -123,13 +120,12 @@ class Teeth:
         extra_gap = extra_half_gap_rad * self.scale * self.lever_m
         header[place.EXTRA_GAP] = min(extra_gap, 0.0)
         self._place_engagement()
+        new = header.copy()
+        teeth = [*self._blocks]
         self._place_structure(wind_ups)
-        header[place.EXTRA_GAP] = extra_gap
+        header[place.EXTRA_GAP] = new[place.EXTRA_GAP] = extra_gap
         if isinstance(mesh, TabulatedMesh):
-            self._place_table(mesh)
-        numbers = odd_numbers(odd_teeth, geometry)
-        header[place.ODD_COUNT], header[place.ODD_AT] = len(numbers), self._place(numbers)
-        header[place.LARGEST_PITCH_ERROR] += farthest_push(odd_teeth)
+            self._place_table(mesh, np.concatenate([new, *teeth[1:]]))
         self.parameters = np.concatenate(self._blocks)
 
     def _place(self, values: Array) -> int:
@@ -137,6 +133,10 @@ class Teeth:
         self._blocks.append(np.asarray(values, dtype=np.float64).ravel())
         self._length += values.size
         return at
+
+    def warn(self) -> None:
+        """Warn where the contact's law is not valid at loads that the drive sees."""
+        self.law.warn_beyond_validity(_PEAK_OVER_RATED * self.rated_tooth_force_n)
 
     def _law(self) -> ContactLaw:
         """Contact in series with the bending of the tooth."""
@@ -151,7 +151,6 @@ class Teeth:
         return np.asarray(errors - errors.mean())
 
     def _place_contact(self) -> None:
-        self.law.warn_beyond_validity(_PEAK_OVER_RATED * self.rated_tooth_force_n)
         table = _kept_table(self.law, 20 * self.rated_tooth_force_n)
         header = self._header
         header[place.CONTACT_STEP] = table.step_m
@@ -288,44 +287,17 @@ class Teeth:
         header[place.SPRING_CELLS] = len(cells)
         header[place.SPRING_AT] = self._place(cells)
 
-    def _place_table(self, mesh: TabulatedMesh) -> None:
-        """Bicubic spline of the teeth's potential over displacement and angle, and its measured error."""
-        from scipy.interpolate import make_interp_spline
-
-        header = self._header
+    def _place_table(self, mesh: TabulatedMesh, teeth: Array) -> None:
+        """The teeth's potential as a table, and its measured error."""
         reach = self.lever_m * self.loaded(4 * self.drive.rated_torque_nm / self.scale)[0]
-        exact = np.concatenate(self._blocks)
-        x = np.linspace(-reach, reach, mesh.twist_nodes)
-        step = x[1] - x[0]
-        angles = np.arange(mesh.angle_nodes) * np.pi / mesh.angle_nodes
-        values = np.array([_teeth.potentials(exact, xi, angles)[:, 0] for xi in x])
-        ends = np.array([_teeth.potentials(exact, xi, angles)[:, 1] for xi in (x[0], x[-1])])
-        # Uniform B-spline coefficients: periodic in the angle, the exact force at both ends of x.
-        turns = 2 * np.pi * np.arange(mesh.angle_nodes // 2 + 1) / mesh.angle_nodes
-
-        def over_angle(samples: Array) -> Array:
-            spectrum = np.fft.rfft(samples, axis=1) / ((2 + np.cos(turns)) / 3)
-            return np.asarray(np.fft.irfft(spectrum, n=mesh.angle_nodes, axis=1))
-
-        knots = np.concatenate([x[0] + step * np.arange(-3, 0), x, x[-1] + step * np.arange(1, 4)])
-        forces = over_angle(ends)
-        curve = make_interp_spline(
-            x, over_angle(values), k=3, t=knots, bc_type=([(1, forces[0])], [(1, forces[1])])
-        )
-        coefficients = np.ascontiguousarray(curve.c)
-        header[place.TABLE_TWIST_STEP] = step
-        header[place.TABLE_TWIST_START] = x[0]
-        header[place.TABLE_TWIST_NODES] = len(coefficients)
+        table = potential_table(teeth, reach, mesh.twist_nodes, mesh.angle_nodes)
+        header = self._header
+        header[place.TABLE_TWIST_STEP] = table.step_m
+        header[place.TABLE_TWIST_START] = table.start_m
+        header[place.TABLE_TWIST_NODES] = len(table.coefficients)
         header[place.TABLE_ANGLE_NODES] = mesh.angle_nodes
-        header[place.TABLE_AT] = self._place(coefficients)
-        table = np.concatenate(self._blocks)
-        rng = np.random.default_rng(0)
-        points = np.stack([rng.uniform(-reach, reach, 2000), rng.uniform(0, np.pi, 2000)], axis=1)
-        errors = [
-            abs(_teeth_table.table_potential(table, xi, a)[1] - _teeth.teeth_potential(exact, xi, a)[1])
-            for xi, a in points
-        ]
-        self.table_error = float(max(errors)) * self.lever_m * self.scale / self.drive.rated_torque_nm
+        header[place.TABLE_AT] = self._place(table.coefficients)
+        self.table_error = table.force_error_n * self.lever_m * self.scale / self.drive.rated_torque_nm
 
     def chain(self) -> dict[str, float]:
         """Compliance budget at rated torque: share of the wind-up in contact and gap, bending, structure."""

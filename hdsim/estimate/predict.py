@@ -312,7 +312,8 @@ class Predictor:
         if self._slow is not None:
             asked["output_torque"] = None
         try:
-            got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol)
+            atol = self.rtol * model.seen_scale
+            got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol, atol=atol)
         except RunFailed as error:
             raise PredictionError(str(error)) from None
         found = {c: got.get(f"measured_{c}", got[c]) for c in self.plan.channels}

@@ -28,14 +28,22 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def sample(model: Model, times: Array, channels: Sequence[str], *, rtol: float = 1e-6) -> dict[str, Array]:
+def sample(
+    model: Model,
+    times: Array,
+    channels: Sequence[str],
+    *,
+    rtol: float = 1e-6,
+    atol: float | Array | None = None,
+) -> dict[str, Array]:
     """Run a model from rest at time 0 to the last of the times.
 
     Args:
         model: the drive with its parts.
         times: when the channels are wanted, shape (m,), s, increasing, not before 0.
         channels: names in ``Observer.formulas``, or of states that parts add.
-        rtol: relative tolerance; absolute: times each state's scale.
+        rtol: relative tolerance.
+        atol: absolute tolerance of the states in their units; rtol times each state's scale when None.
 
     Returns:
         The channels, shape (m,) each; beside those with a sensor what it reads, as ``measured_...``.
@@ -44,7 +52,7 @@ def sample(model: Model, times: Array, channels: Sequence[str], *, rtol: float =
         InputError: there is no such channel.
         RunFailed: the integration stopped before the end; the message says why.
     """
-    return samples_beside(model, (), times, channels, rtol=rtol)[0]
+    return samples_beside(model, (), times, channels, rtol=rtol, atol=atol)[0]
 
 
 def samples_beside(
@@ -54,7 +62,7 @@ def samples_beside(
     channels: Sequence[str],
     *,
     rtol: float = 1e-6,
-    atol: float | None = None,
+    atol: float | Array | None = None,
 ) -> list[dict[str, Array]]:
     """Run a model, and others that differ so little from it that they may be linearised beside it.
 
@@ -67,7 +75,7 @@ def samples_beside(
         times: see ``sample``.
         channels: likewise.
         rtol: likewise.
-        atol: absolute tolerance of every state in its unit; rtol times each state's scale when None.
+        atol: likewise.
 
     Returns:
         What ``sample`` returns, of the model and of each other one.

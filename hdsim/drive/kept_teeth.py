@@ -1,0 +1,50 @@
+"""The teeth of a drive, kept for the next model that has the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hdsim.contact.parameters import TableLawParameters
+from hdsim.drive.parameters import Drive, Friction, Inertia, TabulatedMesh, TeethMesh, ToothedMesh
+from hdsim.drive.toothed import Teeth
+
+Array = NDArray[np.float64]
+
+
+def teeth_of(
+    drive: Drive,
+    mesh: ToothedMesh,
+    wind_ups: Sequence[Callable[[Array], Array]],
+    *,
+    extra_half_gap_rad: float,
+    seed: int,
+) -> Teeth:
+    """``Teeth``, kept for the next model: a fit makes hundreds that differ in numbers that no tooth sees.
+
+    What it returns is shared: its numbers are to be copied before they are changed.
+    """
+    if isinstance(mesh.contact, TableLawParameters):
+        # Its file may change between two drives of one process.
+        found = Teeth(drive, mesh, wind_ups, extra_half_gap_rad=extra_half_gap_rad, seed=seed)
+        found.warn()
+        return found
+    seen = mesh.model_copy(update={"ring": "dynamic", "damping_nm_s_per_rad": 0.0})
+    torsion = drive.torsion.model_copy(update={"damping_nm_s_per_rad": 0.0})
+    unseen: dict[str, Any] = {"preset": None, "friction": Friction(), "inertia": Inertia()}
+    bare = drive.model_copy(update=unseen | {"torsion": torsion, "mesh": seen})
+    found = _kept_teeth(bare, tuple(wind_ups), extra_half_gap_rad, seed)
+    found.warn()
+    return found
+
+
+@lru_cache(maxsize=16)
+def _kept_teeth(
+    drive: Drive, wind_ups: tuple[Callable[[Array], Array], ...], extra_half_gap_rad: float, seed: int
+) -> Teeth:
+    assert isinstance(drive.mesh, TeethMesh | TabulatedMesh)
+    return Teeth(drive, drive.mesh, wind_ups, extra_half_gap_rad=extra_half_gap_rad, seed=seed)
