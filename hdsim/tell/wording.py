@@ -160,6 +160,8 @@ def meaning(found: Findings) -> str:
     said = MEANINGS[verdict.verdict]
     if verdict.verdict == "effect" and found.other_shape is not None:
         said += " No formula is exact: what it leaves of its own shape is said below, and not in found.yaml."
+    if verdict.teeth is not None:
+        said = " ".join([said, *verdict.teeth.sentences])
     if verdict.verdict == "unknown":
         said += (
             " Instead it is given as a curve, which found.yaml adds to the model."
