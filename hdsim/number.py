@@ -24,6 +24,7 @@ class Number:
         matters: tells from the section's model (the drive, the load) whether it changes anything there.
         far: factor from the model's value beyond which a fitted one is suspect.
         may_vanish: it may well be far smaller than thought, so that only a larger one is suspect.
+        asked: it moves only in a fit that asks for it by its path: most records tell little of it.
     """
 
     prior: float
@@ -32,6 +33,7 @@ class Number:
     matters: Callable[[Any], bool] | None = None
     far: float = 5.0
     may_vanish: bool = False
+    asked: bool = False
 
 
 #: Of a number that a measurement leaves as it is: a smoothing, a constant of nature, a choice of origin.

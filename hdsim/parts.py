@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
@@ -58,6 +58,26 @@ class InputFriction:
     coulomb_nm: float
     viscous_nm_s_per_rad: float
     smoothing_velocity_rad_per_s: float
+
+
+@dataclass(frozen=True)
+class OddTooth:
+    """A tooth that differs from those that a mesh has drawn.
+
+    Args:
+        member: the spline that it belongs to.
+        tooth: its number there, from the one that is on the wave generator's major axis at zero angles,
+            rising with the angle; between two whole numbers each of the two teeth has its share of the
+            error.
+        shift_m: how far it is out of place along its normal, m: with a positive one its pair meets earlier at
+            a positive twist.
+        widened_m: half-gap of its pair on top of its own, m; negative where the tooth is too thick.
+    """
+
+    member: Literal["flexspline", "circular_spline"]
+    tooth: float
+    shift_m: float = 0.0
+    widened_m: float = 0.0
 
 
 #: Account of the heat of friction on the motor shaft (see ``Builder.element``).
@@ -153,6 +173,9 @@ class Builder(Protocol):
 
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh, as an angle at the output; below zero teeth are pressed."""
+
+    def odd_tooth(self, tooth: OddTooth) -> None:
+        """Let a tooth differ from the drawn ones; a mesh without teeth has none."""
 
     def signal(self, signal: Any) -> int:
         """Register a signal (``hdsim.actuation.signals``); returns the column of its value in the inputs.

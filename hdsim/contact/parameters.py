@@ -6,12 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args
 
 from pydantic import Field, FilePath
 
+from hdsim.number import Number
 from hdsim.parts import Parameters
 from hdsim.plugins import plugins, wrong_choice
 
 if TYPE_CHECKING:
     from hdsim.contact.law import ContactLaw
     from hdsim.surface.flank import Flank
+
+
+#: Hardness of a heat treatment; stiffness of a contact that nobody has measured.
+_HARDNESS, _STIFFNESS = Number(0.2, asked=True), Number(0.7, asked=True)
 
 
 class ToothMaterial(Parameters):
@@ -21,7 +26,7 @@ class ToothMaterial(Parameters):
     """Young's modulus E, Pa."""
     poisson_ratio: float = Field(gt=-1, le=0.5)
     """Poisson's ratio."""
-    hardness_pa: float = Field(3.0e9, gt=0)
+    hardness_pa: Annotated[float, _HARDNESS] = Field(3.0e9, gt=0)
     """Hardness H, Pa: 9.81e6 times the Brinell number (tempered steel of HB 280-320: 2.75-3.14e9)."""
 
 
@@ -88,7 +93,7 @@ class ConstantStiffnessParameters(Parameters):
     """Linear contact."""
 
     law: Literal["constant"]
-    contact_stiffness_n_per_m: float = Field(gt=0)
+    contact_stiffness_n_per_m: Annotated[float, _STIFFNESS] = Field(gt=0)
     """Stiffness of one tooth pair's contact, N/m."""
 
     def build(self, surface: Flank) -> ContactLaw:

@@ -20,6 +20,7 @@ from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.search import Search, Stage
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.flanks import only_flanks
 from hdsim.estimate.found import Gap
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out
@@ -50,6 +51,7 @@ def collect(
     last = found.stages[-1].location
     explained = bench.power(base.fit.predictions) - bench.power(found.fit.predictions)
     left = last.structured * found.left.power
+    flanks = only_flanks(bench, left, found.left.project)
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
         laws=[
@@ -64,7 +66,7 @@ def collect(
         ],
         explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
         left=last.structured,
-        left_chance=last.chance,
+        left_chance=1.0 if flanks else last.chance,
         held=_held(bench, predictions) if found.named else HeldOutEvidence(),
         rest=_rest(bench, found.fit.predictions),
         fell=max((1.0 - g.refit / g.before for g in gap.values() if g.before > 0), default=0.0),

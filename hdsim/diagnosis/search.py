@@ -22,6 +22,7 @@ from hdsim.diagnosis.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
+from hdsim.estimate.flanks import only_flanks
 from hdsim.estimate.orders import Line, order_lines, power_of
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import align, reweigh, together, with_delays
@@ -124,6 +125,8 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         title, locate(bench, found.left, bench.residuals(current.predictions, drift=True)), found.left.power
     )
     found.stages.append(stage)
+    if only_flanks(bench, stage.location.structured * stage.power, found.left.project):
+        return None
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
@@ -191,6 +194,9 @@ def _one_more(
     coordinate = places[0].coordinate if places else ""
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell)
     if named is None:
+        return None
+    change = left.project(bench.trace(current.predictions, named.fit.predictions))
+    if only_flanks(bench, float(change @ change), left.project):
         return None
     named.gain = _gain(bench, base, current, named.fit)
     named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))

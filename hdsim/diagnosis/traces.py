@@ -104,6 +104,8 @@ def screen(
         for fitting in fittings:
             if any(channel not in bench.channels for channel in fitting.needs):
                 continue
+            if fitting.mesh and fitting.mesh != ("toothed" if state.toothed else "toothless"):
+                continue
             if not measured.issuperset(fitting.follows) or measured.intersection(fitting.unless):
                 continue
             if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):

@@ -67,6 +67,25 @@ class Remainder(Part):
     """Its end."""
 
 
+class TeethFound(Part):
+    """What the named effects mean in the drive's teeth."""
+
+    sentences: list[str] = []
+    """All of it in words."""
+    member: str = ""
+    """Spline that a single tooth belongs to."""
+    tooth: FittedNumber | None = None
+    """Its number, from the tooth on the wave generator's lobe at zero angles."""
+    opposite: float | None = None
+    """The tooth half a turn on, which these data cannot tell from it."""
+    half_gap_um: FittedNumber | None = None
+    """Mean half-gap of the teeth."""
+    roughness_m: dict[str, float] = {}
+    """Fractal roughness G that leaves it, by spline, where the model has no teeth."""
+    scenario: str | None = None
+    """The scenario of the drive whose teeth have the play that was found."""
+
+
 class Verdict(Part):
     """What a diagnosis found."""
 
@@ -105,6 +124,8 @@ class Verdict(Part):
     adds to the logarithm of its odds and the resulting probability; of the whole, thresholds."""
     next_experiment: NextExperiment | None = None
     """What to measure next, where these data cannot distinguish effects."""
+    teeth: TeethFound | None = None
+    """What the named effects mean in the drive's teeth, where they say anything of them."""
     scenario: str | None = None
     """The scenario that extends the base with the result."""
     readings: int = 1

@@ -17,6 +17,7 @@ from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.remainder import remainder
 from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.search import Search, Stage, search
+from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.verdict import Located, NamedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.errors import InputError
@@ -218,7 +219,8 @@ def _diagnosed(
         effects = _effects(named, decision, current)
         words = " and ".join(_words(effect) for effect in effects)
         sentence = f"The model is missing {words}.{_rest_words(found.stages[-1], evidence)}"
-        verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, **common)
+        teeth = teeth_found(effects, current.state)
+        verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
         verdict = _numbers_off(off, common, sure=bool(moved))
     else:

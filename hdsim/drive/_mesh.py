@@ -31,6 +31,7 @@ from hdsim.drive._mesh_layout import (
     KAPPA,
     LEVER,
     MESH_TWIST,
+    ODD_COUNT,
     OUTPUT_SHARE,
     RESULT_SIZE,
     SPRING_AT,
@@ -38,6 +39,7 @@ from hdsim.drive._mesh_layout import (
     SPRING_STEP,
     TWIST,
 )
+from hdsim.drive._odd_tooth import odd_potential
 from hdsim.drive._quartic import spring
 from hdsim.drive._teeth import teeth_potential
 from hdsim.drive._teeth_table import table_potential
@@ -87,6 +89,8 @@ def teeth_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-de
     p = parameters
     twist = mesh_twist(p, angles, error)
     local = teeth_potential(p, p[LEVER] * twist, angles[1] - angles[0])
+    if p[ODD_COUNT] > 0.0:
+        local = odd_potential(p, p[LEVER] * twist, angles, local)
     assemble(p, angles, error, local, result)
     result[MESH_TWIST] = twist
 
@@ -97,6 +101,8 @@ def table_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-de
     p = parameters
     twist = mesh_twist(p, angles, error)
     local = table_potential(p, p[LEVER] * twist, angles[1] - angles[0])
+    if p[ODD_COUNT] > 0.0:
+        local = odd_potential(p, p[LEVER] * twist, angles, local)
     assemble(p, angles, error, local, result)
     result[MESH_TWIST] = twist
 

@@ -38,4 +38,14 @@ TABLE_AT = 24
 TABLE_TWIST_START = 25
 SMOOTHING = 26  # half-width of the dead-zone's rounded corners, m
 CONSTANT_GAPS_AT = 27  # constant half-gaps of the teeth, twice over as the pitch errors; 0: none
-HEADER = 28
+ODD_COUNT = 28  # teeth that differ from the drawn ones; 0: none
+ODD_AT = 29  # where they stand, ``PER_ODD`` numbers each
+HEADER = 30
+
+# A tooth that differs, see ``hdsim.drive._odd_tooth``.
+ODD_MEMBER = 0  # 0 of the flexspline, 1 of the circular spline
+ODD_TOOTH = 1  # its number, from 0
+ODD_SHARE = 2  # of it, between 0 and 1
+ODD_SHIFT = 3  # out of its place along the normal, m
+ODD_WIDENED = 4  # half-gap on top of its own, m
+PER_ODD = 5

@@ -120,6 +120,80 @@ def window_potential(p, x, angle):  # type: ignore[no-untyped-def]
     return v, v_x, v_xx, v_a, v_aa, v_xa, engaged
 
 
+@_inline
+def pair_potential(p, x, phi, c2, s2, tooth, shift, widened):  # type: ignore[no-untyped-def]
+    """One tooth's part of ``teeth_potential``, and whether it carries load (0 or 1).
+
+    Args:
+        p: the mesh's numbers.
+        x: common displacement, m.
+        phi: the tooth's angle from the major axis, within a quarter of a turn, rad.
+        c2: cos(2 phi); read where a clearance engages the teeth.
+        s2: sin(2 phi); likewise.
+        tooth: its number.
+        shift: displacement on top of its pitch error, m.
+        widened: half-gap on top of its own, m.
+    """
+    weight, slope, curvature = 1.0, 0.0, 0.0
+    gap, gap_a, gap_aa = p[EXTRA_GAP] + widened, 0.0, 0.0
+    pressed = gap < 0.0
+    smoothing = p[SMOOTHING]
+    if p[KIND] != 0.0:
+        gap += 0.5 * p[CLEARANCE] * (1.0 - c2)
+        gap_a += p[CLEARANCE] * s2
+        gap_aa += 2.0 * p[CLEARANCE] * c2
+    else:
+        weight, slope, curvature = window(phi, p[PLATEAU], p[BORDER])
+    cells = int(p[GAP_CELLS])
+    gap_at = int(p[GAP_AT])
+    if cells == 1:
+        gap += p[gap_at + 4 * tooth]
+    else:
+        cell_width = math.pi / cells
+        cell = int((phi + 0.5 * math.pi) / cell_width)
+        cell = min(max(cell, 0), cells - 1)
+        s = phi + 0.5 * math.pi - cell * cell_width
+        at = gap_at + 4 * (tooth * cells + cell)
+        gap += p[at] + s * (p[at + 1] + s * (p[at + 2] + s * p[at + 3]))
+        gap_a += p[at + 1] + s * (2.0 * p[at + 2] + s * 3.0 * p[at + 3])
+        gap_aa += 2.0 * p[at + 2] + s * 6.0 * p[at + 3]
+    shifted = x + p[int(p[PITCH_ERROR_AT]) + tooth] + shift
+    v = v_x = v_xx = v_a = v_aa = v_xa = engaged = 0.0
+    if abs(shifted) - gap <= -smoothing:
+        return v, v_x, v_xx, v_a, v_aa, v_xa, engaged
+    side = 1.0 if shifted > 0.0 else -1.0
+    # Without interference the far flank is out of touch wherever the near one is in touch.
+    for flank in range(2 if pressed else 1):
+        depth = abs(shifted) - gap
+        by_x, by_gap, by_x2, by_x_gap = 1.0, -1.0, 0.0, 0.0
+        if pressed:
+            depth = (abs(shifted) if flank == 0 else -abs(shifted)) - gap
+            if depth <= -smoothing:
+                break
+            if flank == 1:
+                side = -side
+            if smoothing > 0.0:
+                depth, by_x, by_x2 = ramp(depth, smoothing)
+                by_gap, by_x_gap = -by_x, -by_x2
+        elif smoothing > 0.0:
+            depth, by_x, by_gap, by_x2, by_x_gap = smooth_depth(abs(shifted), gap, smoothing)
+        energy, force, stiffness = hermite(p, int(p[CONTACT_AT]), p[CONTACT_STEP], p[CONTACT_CELLS], depth)
+        if weight >= 0.5 and depth > 0.0 and flank == 0:
+            engaged = 1.0
+        v += weight * energy
+        # by_x2 is the second derivative over the gap, too.
+        v_x += weight * force * by_x * side
+        v_xx += weight * (stiffness * by_x * by_x + force * by_x2)
+        v_a += slope * energy + weight * force * by_gap * gap_a
+        curved = (stiffness * by_gap * by_gap + force * by_x2) * gap_a * gap_a
+        v_aa += curvature * energy + 2.0 * slope * force * by_gap * gap_a
+        v_aa += weight * (curved + force * by_gap * gap_aa)
+        v_xa += side * (
+            slope * force * by_x + weight * (stiffness * by_x * by_gap + force * by_x_gap) * gap_a
+        )
+    return v, v_x, v_xx, v_a, v_aa, v_xa, engaged
+
+
 @_jit
 def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
     """Sum over the teeth at common displacement x and ring angle a from the major axis.
@@ -127,23 +201,13 @@ def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
     With a preload (a negative extra gap) both flanks of a tooth may press at once: U(x - b) + U(-x - b).
     Returns V, V_x, V_xx, V_a, V_aa, V_xa and the number of teeth that carry load.
     """
-    preloaded = p[EXTRA_GAP] < 0.0
-    if p[CONSTANT_GAPS_AT] > 0.0 and not preloaded:
+    if p[CONSTANT_GAPS_AT] > 0.0 and p[EXTRA_GAP] >= 0.0:
         return window_potential(p, x, angle)
     teeth = int(p[TEETH])
     pitch = 2.0 * math.pi / teeth
     clearing = p[KIND] != 0.0
     border = contact_border(p, x)
-    cells = int(p[GAP_CELLS])
-    cell_width = math.pi / cells
-    gap_at = int(p[GAP_AT])
-    pitch_at = int(p[PITCH_ERROR_AT])
-    contact_at = int(p[CONTACT_AT])
-    contact_step = p[CONTACT_STEP]
-    contact_cells = p[CONTACT_CELLS]
-    smoothing = p[SMOOTHING]
-    v = v_x = v_xx = v_a = v_aa = v_xa = 0.0
-    engaged = 0
+    v = v_x = v_xx = v_a = v_aa = v_xa = engaged = 0.0
     turn_cos = math.cos(2.0 * pitch)
     turn_sin = math.sin(2.0 * pitch)
     for lobe in range(2):
@@ -156,62 +220,20 @@ def teeth_potential(p, x, angle):  # type: ignore[no-untyped-def]
         tooth = first % teeth
         for j in range(first, last + 1):
             phi = j * pitch + origin
-            weight, slope, curvature = 1.0, 0.0, 0.0
-            gap, gap_a, gap_aa = p[EXTRA_GAP], 0.0, 0.0
+            own = pair_potential(p, x, phi, c2, s2, tooth, 0.0, 0.0)
             if clearing:
-                gap += 0.5 * p[CLEARANCE] * (1.0 - c2)
-                gap_a += p[CLEARANCE] * s2
-                gap_aa += 2.0 * p[CLEARANCE] * c2
                 c2, s2 = c2 * turn_cos - s2 * turn_sin, s2 * turn_cos + c2 * turn_sin
-            else:
-                weight, slope, curvature = window(phi, p[PLATEAU], p[BORDER])
-            if cells == 1:
-                gap += p[gap_at + 4 * tooth]
-            else:
-                cell = int((phi + 0.5 * math.pi) / cell_width)
-                cell = min(max(cell, 0), cells - 1)
-                s = phi + 0.5 * math.pi - cell * cell_width
-                at = gap_at + 4 * (tooth * cells + cell)
-                gap += p[at] + s * (p[at + 1] + s * (p[at + 2] + s * p[at + 3]))
-                gap_a += p[at + 1] + s * (2.0 * p[at + 2] + s * 3.0 * p[at + 3])
-                gap_aa += 2.0 * p[at + 2] + s * 6.0 * p[at + 3]
-            shifted = x + p[pitch_at + tooth]
             tooth += 1
             if tooth == teeth:
                 tooth = 0
-            if abs(shifted) - gap <= -smoothing:
-                continue
-            side = 1.0 if shifted > 0.0 else -1.0
-            # Without interference the far flank is out of touch wherever the near one is in touch.
-            for flank in range(2 if preloaded else 1):
-                depth = abs(shifted) - gap
-                by_x, by_gap, by_x2, by_x_gap = 1.0, -1.0, 0.0, 0.0
-                if preloaded:
-                    depth = (abs(shifted) if flank == 0 else -abs(shifted)) - gap
-                    if depth <= -smoothing:
-                        break
-                    if flank == 1:
-                        side = -side
-                    if smoothing > 0.0:
-                        depth, by_x, by_x2 = ramp(depth, smoothing)
-                        by_gap, by_x_gap = -by_x, -by_x2
-                elif smoothing > 0.0:
-                    depth, by_x, by_gap, by_x2, by_x_gap = smooth_depth(abs(shifted), gap, smoothing)
-                energy, force, stiffness = hermite(p, contact_at, contact_step, contact_cells, depth)
-                if weight >= 0.5 and depth > 0.0 and flank == 0:
-                    engaged += 1
-                v += weight * energy
-                # by_x2 is the second derivative over the gap, too.
-                v_x += weight * force * by_x * side
-                v_xx += weight * (stiffness * by_x * by_x + force * by_x2)
-                v_a += slope * energy + weight * force * by_gap * gap_a
-                curved = (stiffness * by_gap * by_gap + force * by_x2) * gap_a * gap_a
-                v_aa += curvature * energy + 2.0 * slope * force * by_gap * gap_a
-                v_aa += weight * (curved + force * by_gap * gap_aa)
-                v_xa += side * (
-                    slope * force * by_x + weight * (stiffness * by_x * by_gap + force * by_x_gap) * gap_a
-                )
-    return v, v_x, v_xx, v_a, v_aa, v_xa, float(engaged)
+            v += own[0]
+            v_x += own[1]
+            v_xx += own[2]
+            v_a += own[3]
+            v_aa += own[4]
+            v_xa += own[5]
+            engaged += own[6]
+    return v, v_x, v_xx, v_a, v_aa, v_xa, engaged
 
 
 @_jit
@@ -222,38 +244,12 @@ def tooth_forces(p, x, angle, forces, angles):  # type: ignore[no-untyped-def]
     """
     teeth = int(p[TEETH])
     pitch = 2.0 * math.pi / teeth
-    cells = int(p[GAP_CELLS])
-    cell_width = math.pi / cells
     for tooth in range(teeth):
         phi = tooth * pitch + angle
         angles[tooth] = phi - 2.0 * math.pi * math.floor(phi / (2.0 * math.pi) + 0.5)
         phi -= math.pi * math.floor(phi / math.pi + 0.5)
-        weight = 1.0
-        gap = p[EXTRA_GAP]
-        if p[KIND] != 0.0:
-            gap += 0.5 * p[CLEARANCE] * (1.0 - math.cos(2.0 * phi))
-        else:
-            weight = window(phi, p[PLATEAU], p[BORDER])[0]
-        cell = min(max(int((phi + 0.5 * math.pi) / cell_width), 0), cells - 1)
-        s = phi + 0.5 * math.pi - cell * cell_width
-        at = int(p[GAP_AT]) + 4 * (tooth * cells + cell)
-        gap += p[at] + s * (p[at + 1] + s * (p[at + 2] + s * p[at + 3]))
-        shifted = x + p[int(p[PITCH_ERROR_AT]) + tooth]
-        forces[tooth] = 0.0
-        preloaded = p[EXTRA_GAP] < 0.0
-        for flank in range(2 if preloaded else 1):
-            side = 1.0 if shifted > 0.0 else -1.0
-            depth, by_x = abs(shifted) - gap, 1.0
-            if flank == 1:
-                side, depth = -side, -abs(shifted) - gap
-            if p[SMOOTHING] > 0.0:
-                if preloaded:
-                    depth, by_x, _ = ramp(depth, p[SMOOTHING])
-                else:
-                    depth, by_x, _, _, _ = smooth_depth(abs(shifted), gap, p[SMOOTHING])
-            if depth > 0.0:
-                force = by_x * hermite(p, int(p[CONTACT_AT]), p[CONTACT_STEP], p[CONTACT_CELLS], depth)[1]
-                forces[tooth] += weight * force * side
+        c2, s2 = math.cos(2.0 * phi), math.sin(2.0 * phi)
+        forces[tooth] = pair_potential(p, x, phi, c2, s2, tooth, 0.0, 0.0)[1]
 
 
 @_jit

@@ -13,7 +13,7 @@ from hdsim.errors import InputError
 from hdsim.kernel import OWN, SIGNAL_VALUES, Kernel
 
 if TYPE_CHECKING:
-    from hdsim.parts import InputFriction, State
+    from hdsim.parts import InputFriction, OddTooth, State
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,7 @@ class Contributions:
     external: dict[str, int] = field(default_factory=dict)
     housing: tuple[int, float] | None = None
     half_gap_rad: float = 0.0
+    odd_teeth: list[OddTooth] = field(default_factory=list)
     play: bool = False
 
 
@@ -94,6 +95,10 @@ class Contributed:
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh (rad at the output); see ``hdsim.parts.Builder.widen_gap``."""
         self._given.half_gap_rad += half_gap_rad
+
+    def odd_tooth(self, tooth: OddTooth) -> None:
+        """Let a tooth differ; see ``hdsim.parts.Builder.odd_tooth``."""
+        self._given.odd_teeth.append(tooth)
 
     def signal(self, signal: Any) -> int:
         """Register a signal; returns the column of its value."""

@@ -126,6 +126,7 @@ class Model(Contributed):
     def _mesh_parameters(self) -> tuple[Kernel | None, Array]:
         """The mesh kernel and its numbers."""
         from hdsim.drive import _mesh, _mesh_layout, kept_teeth, spring
+        from hdsim.drive.odd_teeth import with_odd_teeth
 
         mesh = self.drive.mesh
         if isinstance(mesh, RigidMesh):
@@ -149,6 +150,7 @@ class Model(Contributed):
             seed=self.seed,
             table_for=self._table_for,
         )
+        self.teeth = with_odd_teeth(self.teeth, self._given.odd_teeth)
         kernel = _mesh.table_mesh if isinstance(self.teeth.mesh, TabulatedMesh) else _mesh.teeth_mesh
         return kernel, self.teeth.parameters
 

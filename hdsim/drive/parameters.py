@@ -27,6 +27,10 @@ _ENDS = Number(0.4, group="section_torques", matters=_elastic)
 #: Friction and damping differ more between two drives of a size, and with grease and temperature.
 _FRICTION = Number(0.7, far=15.0, may_vanish=True)
 _DAMPING = Number(1.0, matters=_elastic, far=15.0, may_vanish=True)
+#: Of the teeth: how many share the load, how far they bend, how far apart they are. What the catalogue's
+#: stiffness has of them stays as it is, so that few records tell them: a fit moves them when asked.
+_SHARE, _EDGE, _BENDING = Number(0.3, asked=True), Number(0.5, asked=True), Number(0.5, asked=True)
+_GAP, _PITCH = Number(0.7, asked=True), Number(0.7, may_vanish=True, asked=True)
 
 
 class Geometry(Parameters):
@@ -131,9 +135,9 @@ class WindowEngagement(Parameters):
     """Two opposite arcs of teeth carry load, centred on the wave generator's major axis."""
 
     kind: Literal["window"] = "window"
-    share: float = Field(0.30, gt=0, le=0.9)
+    share: Annotated[float, _SHARE] = Field(0.30, gt=0, le=0.9)
     """Share of the teeth that the arcs hold (sum of the weights over the number of teeth)."""
-    edge_teeth: float = Field(8.0, gt=0)
+    edge_teeth: Annotated[float, _EDGE] = Field(8.0, gt=0)
     """Teeth over which the weight rises from 0 to 1 at each end of an arc; over half of its teeth, a bell."""
 
 
@@ -141,9 +145,9 @@ class ClearanceEngagement(Parameters):
     """The gap grows away from the major axis as (1 - cos 2 phi)/2, so the engaged share grows with torque."""
 
     kind: Literal["clearance"] = "clearance"
-    share: float = Field(0.30, gt=0, le=0.9)
+    share: Annotated[float, _SHARE] = Field(0.30, gt=0, le=0.9)
     """Share of the teeth in contact at rated torque; the clearance is calibrated to it."""
-    clearance_m: float | None = Field(None, gt=0)
+    clearance_m: Annotated[float | None, _GAP] = Field(None, gt=0)
     """Clearance on the minor axis, m; given instead of the calibration."""
 
 
@@ -156,13 +160,13 @@ class ToothedMesh(Parameters):
     engagement: Engagement = WindowEngagement()
     flanks: RoughFlanks = RoughFlanks()
     contact: ContactParameters = MajumdarBhushanParameters()
-    tooth_bending_stiffness_n_per_m: float | None = Field(1.4e8, gt=0)
+    tooth_bending_stiffness_n_per_m: Annotated[float | None, _BENDING] = Field(1.4e8, gt=0)
     """Bending stiffness of one tooth pair in series with its contact, N/m (null: rigid teeth)."""
-    pitch_error_m: float = Field(0.0, ge=0)
+    pitch_error_m: Annotated[float, _PITCH] = Field(0.0, ge=0)
     """Standard deviation of the teeth's pitch error, m."""
-    half_gap_m: float | None = Field(None, ge=0)
+    half_gap_m: Annotated[float | None, _GAP] = Field(None, ge=0)
     """The same half-gap for every tooth, m; given instead of the Weierstrass-Mandelbrot backlash."""
-    gap_factor: float = Field(1.0, ge=0, le=1000)
+    gap_factor: Annotated[float, _GAP] = Field(1.0, ge=0, le=1000)
     """Factor on every half-gap: 2 is the same flanks with the backlash doubled."""
     gap_along_flank: bool = False
     """Let the gap follow the flank's profile as the contact point slides, instead of each tooth's average."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from hdsim.effects._periodic import Periodic
 from hdsim.effects._plausible import Plausible, Range, range_of, scales_of
@@ -166,6 +166,7 @@ class Fitting:
         follows: measured channels that it takes as they are (``Builder.external``): asked only of records
             that have them.
         unless: measured channels that tell more than this way can: not asked of records that have them.
+        mesh: models that it is asked of, where not of all: those with teeth, or those without.
         lives_in: coordinates in which this way's residual is a function, the most telling first; those of the
             effect's signature where there are none.
     """
@@ -180,6 +181,7 @@ class Fitting:
     cumulative: bool = False
     follows: tuple[str, ...] = ()
     unless: tuple[str, ...] = ()
+    mesh: Literal["", "toothed", "toothless"] = ""
     lives_in: tuple[str, ...] = ()
 
     @property

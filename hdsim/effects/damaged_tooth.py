@@ -52,6 +52,7 @@ class DamagedTooth(Effect):
         confused_with={
             "kinematic_error": "a few smooth harmonics over the whole turn instead of many in a narrow "
             "range of angle",
+            "tooth_error": "the same in a model that has the teeth themselves",
             "sensors": "a fault of an encoder's disc repeats once per turn of its own shaft and leaves no "
             "torque",
         },
@@ -66,6 +67,7 @@ class DamagedTooth(Effect):
             settings={"passes_per_turn": lobes, "member": member},
             label=label,
             turns=1.0,
+            mesh="toothless",
         )
         for lobes, member, label in (
             (2, "output", ""),

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Fitting, Plausible
+from hdsim.effects._fitting import Amplitude, Fitting, Plausible
 from hdsim.effects._kernels import ARCMIN
 from hdsim.parts import Builder, Effect, Signature
 
@@ -19,7 +19,7 @@ class MeshPreload(Effect):
     has no play then, teeth carry load at rest, and around zero torque the mesh is stiffer by the second
     flank. The catalogue's stiffness is that of the preloaded drive. With wear (``output_backlash``) the sum
     of both counts. A lumped mesh has no teeth: there it only takes up the play that other effects add; a
-    rigid one has none. A diagnosis compares lumped and rigid models, so it does not ask for this one.
+    rigid one has none. A diagnosis asks for it where the model has teeth, whose gaps may be too wide.
     """
 
     title: ClassVar[str] = "mesh preload"
@@ -37,7 +37,9 @@ class MeshPreload(Effect):
             "stiffness_nonlinearity": "stiffer at large torques, a preloaded mesh around none",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = ()
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        Fitting((Amplitude({"interference_arcmin": 0.1}),), mesh="toothed"),
+    )
 
     interference_arcmin: Annotated[
         float,

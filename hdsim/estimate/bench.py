@@ -46,6 +46,8 @@ class Bench:
         self.training, self.zeros = len(training), zeros
         self.series: list[Series] = []
         self.blocks = 0
+        #: Predictions with the model's own flanks, then with others (``flanks.hear_flanks``).
+        self.redrawn: list[list[Array]] = []
         for index, predictor in enumerate(self.predictors):
             self._add(index, predictor, own_record=index >= self.training, split=not holdout)
         if not any(series.train.any() for series in self.series):
@@ -148,7 +150,8 @@ class Bench:
 
         ``twist_arcmin`` (between 1 % quantiles) where they tell it; ``torque_nm`` and
         ``motor_side_torque_nm``, the largest torque at the output, measured or as the motor's, else the one
-        where the drive's third stiffness begins.
+        where the drive's third stiffness begins. Of a mesh with teeth the angle between two of each spline,
+        ``flexspline_pitch_deg`` and ``circular_spline_pitch_deg``.
 
         Args:
             state: the model.
@@ -162,6 +165,10 @@ class Bench:
                     largest = max(largest, factor * float(np.quantile(values, 0.99)))
                     break
         largest = largest or state.drive.torsion.torque_t2_nm
+        if state.toothed:
+            geometry = state.drive.geometry
+            found["flexspline_pitch_deg"] = 360.0 / geometry.flexspline_teeth
+            found["circular_spline_pitch_deg"] = 360.0 / geometry.circular_spline_teeth
         return found | {"torque_nm": largest, "motor_side_torque_nm": largest / abs(self.predictors[0].ratio)}
 
     def _twists(self) -> dict[str, float]:

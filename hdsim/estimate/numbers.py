@@ -117,7 +117,7 @@ def base_freedoms(
     locked: bool = False,
     apart: Collection[str] = (),
 ) -> list[Free]:
-    """Numbers that the model has and that a fit may move: the zero ones stay zero.
+    """Numbers that the model has and that a fit may move by itself: the zero ones stay zero.
 
     Args:
         state: the model.
@@ -134,7 +134,12 @@ def base_freedoms(
     found: dict[tuple[str, str], Free] = {}
     for section, model in sections.items():
         for path, value, number, metadata in _numbers(model, section):
-            if value <= 0 or not number.prior or (number.matters is not None and not number.matters(model)):
+            if (
+                value <= 0
+                or not number.prior
+                or number.asked
+                or (number.matters is not None and not number.matters(model))
+            ):
                 continue
             one = _free(path, value, number, metadata)
             one = replace(one, compliance=number.compliance or _inverse(model, path.rpartition(".")[2]))
@@ -175,12 +180,12 @@ def delay_freedoms(
 
 
 def undeclared(state: State, path: str, prior: float) -> Free | None:
-    """A number of the model that no field declares as one to fit; None where there is none above zero.
+    """A number of the model that no fit moves by itself; None where there is none above zero.
 
     Args:
         state: the model.
         path: dotted, in the scenario.
-        prior: standard deviation of its logarithm.
+        prior: standard deviation of its logarithm, where its field does not say.
     """
     sections = {"drive": state.drive, "load": state.load}
     sections |= {f"effects.{name}": effect for name, effect in state.effects.items()}

@@ -11,6 +11,7 @@ import numpy as np
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation, robust_covariance
 from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
+from hdsim.estimate.flanks import hear_flanks
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
@@ -94,6 +95,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
     bench.hear_motion(found.state, found.predictions)
+    hear_flanks(bench, found.state)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
     # still hold much of it leaves what the next one finds.
     reweigh(bench, found)

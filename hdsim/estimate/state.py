@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from hdsim import number
+from hdsim.drive.parameters import ToothedMesh
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
 from hdsim.effects.table import Table
@@ -106,6 +107,11 @@ class State:
     gain: float = 1.0
     seed: int = 0
     delays: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def toothed(self) -> bool:
+        """Whether the drive's mesh has teeth."""
+        return isinstance(self.drive.mesh, ToothedMesh)
 
     def reading(self, channel: str, time: Array, values: Array, before: State | None = None) -> Array:
         """What the log shows of a predicted channel.

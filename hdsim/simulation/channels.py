@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.drive import _layout as a
-from hdsim.drive import _mesh_layout, _teeth
+from hdsim.drive import _mesh_layout, _odd_tooth, _teeth
 from hdsim.drive._assembly import observe, observe_coordinates
 from hdsim.errors import InputError
 from hdsim.kernel import (
@@ -292,7 +292,11 @@ class Observer:
         for k in range(len(times)):
             motor, ring, _ = rows[k, a.S_ANGLES : a.S_ANGLES + 3]
             twist = rows[k, a.S_MESH + _mesh_layout.MESH_TWIST]
-            _teeth.tooth_forces(teeth.parameters, teeth.lever_m * twist, ring - motor, forces[k], angles[k])
+            shift = teeth.lever_m * twist
+            _teeth.tooth_forces(teeth.parameters, shift, ring - motor, forces[k], angles[k])
+            _odd_tooth.odd_forces(
+                teeth.parameters, shift, rows[k, a.S_RELATIVE : a.S_RELATIVE + 3], forces[k]
+            )
         return Table(
             times,
             {

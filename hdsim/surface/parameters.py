@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from hdsim.number import Number
 from hdsim.parts import Parameters
 
 if TYPE_CHECKING:
@@ -17,12 +18,17 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+#: D of ground to milled flanks is 2.3 to 2.7; G differs by decades between two machinings, and by the method
+#: that it is identified with.
+_DIMENSION, _ROUGHNESS = Number(0.05, far=1.15, asked=True), Number(1.5, far=50.0, asked=True)
+
+
 class FlankParameters(Parameters):
     """A rough flank as its two fractal parameters."""
 
-    fractal_dimension: float = Field(gt=2, lt=3)
+    fractal_dimension: Annotated[float, _DIMENSION] = Field(gt=2, lt=3)
     """Fractal dimension D of the surface."""
-    fractal_roughness_m: float = Field(gt=0, lt=1e-3)
+    fractal_roughness_m: Annotated[float, _ROUGHNESS] = Field(gt=0, lt=1e-3)
     """Fractal roughness G, m."""
 
     def build(self) -> Flank:

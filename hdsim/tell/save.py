@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdsim.diagnosis.following import next_experiment
+from hdsim.diagnosis.teeth import toothed_changes
 from hdsim.estimate.write import scenario_text
+from hdsim.scenario.writer import to_yaml
 from hdsim.tell.findings import Findings, gather
 from hdsim.tell.record_out import write_compared
 from hdsim.tell.report import write_report
@@ -15,6 +17,9 @@ from hdsim.tell.words import title_of
 
 if TYPE_CHECKING:
     from hdsim.diagnosis.workflow import Diagnosis
+
+#: Name of the scenario of a drive whose teeth have the play that was found.
+TOOTHED = "with teeth that have the play that was found"
 
 
 def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Findings | None = None) -> Path:
@@ -33,13 +38,18 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Finding
     verdict = diagnosis.verdict
     with staged(out) as stage:
         # What an earlier diagnosis found must not stay beside this one's verdict.
-        for name in ("found.yaml", "next.yaml", "curve.png"):
+        for name in ("found.yaml", "next.yaml", "toothed.yaml", "curve.png"):
             (out / name).unlink(missing_ok=True)
         if verdict.verdict in ("effect", "parameter") or verdict.curve is not None:
             state, freedoms = diagnosis.final.state, diagnosis.refit.freedoms
             text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
             (stage / "found.yaml").write_text(text, encoding="utf-8")
             verdict.scenario = str(out / "found.yaml")
+            changes = toothed_changes(verdict.effects, state)
+            if changes is not None and verdict.teeth is not None:
+                head = {"name": TOOTHED, "extends": "found.yaml"}
+                (stage / "toothed.yaml").write_text(to_yaml(head | changes), encoding="utf-8")
+                verdict.teeth.scenario = str(out / "toothed.yaml")
         experiment = next_experiment(diagnosis, Path(base), out, title_of)
         if experiment is not None:
             (stage / "next.yaml").write_text(experiment, encoding="utf-8")

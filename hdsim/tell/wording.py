@@ -166,6 +166,8 @@ def meaning(found: Findings) -> str:
         said += (
             " Its equation is not exact: the remaining residual is shown below and not part of found.yaml."
         )
+    if verdict.teeth is not None:
+        said = " ".join([said, *verdict.teeth.sentences])
     if verdict.verdict == "unknown":
         said += (
             " It is estimated as a curve instead, which found.yaml adds to the model."

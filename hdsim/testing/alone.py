@@ -22,7 +22,7 @@ from hdsim.kernel import (
     Kernel,
     element,
 )
-from hdsim.parts import INPUT_FRICTION_HEAT, InputFriction, Part, State
+from hdsim.parts import INPUT_FRICTION_HEAT, InputFriction, OddTooth, Part, State
 from hdsim.testing import _calls
 
 Array = NDArray[np.float64]
@@ -67,6 +67,7 @@ class Collector:
         self.states: list[State] = []
         self.compliances: list[Callable[[Any], Any]] = []
         self.half_gap = 0.0
+        self.odd_teeth: list[OddTooth] = []
         self.moving_housing: tuple[int, float] | None = None
         self.sensors: dict[str, Any] = {}
 
@@ -109,6 +110,10 @@ class Collector:
     def widen_gap(self, half_gap_rad: float) -> None:
         """See ``hdsim.parts.Builder.widen_gap``."""
         self.half_gap += half_gap_rad
+
+    def odd_tooth(self, tooth: OddTooth) -> None:
+        """See ``hdsim.parts.Builder.odd_tooth``."""
+        self.odd_teeth.append(tooth)
 
     def signal(self, signal: Any) -> int:
         """See ``hdsim.parts.Builder.signal``."""

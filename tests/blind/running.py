@@ -25,7 +25,7 @@ from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.records import Record
 from hdsim.scenario import Scenario
 
-FAMILIES = ("numpy", "mujoco", "toothed", "real")
+FAMILIES = ("numpy", "mujoco", "toothed", "teeth", "real")
 #: Cases of the page, packed.
 KEPT = Path(__file__).parent / "results.jsonl.gz"
 

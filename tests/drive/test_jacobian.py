@@ -15,6 +15,7 @@ EFFECTS: dict[str, Any] = {
     "torsional_hysteresis_maxwell": {},
     "thermal_friction": {},
     "output_eccentricity": {},
+    "tooth_error": {"member": "circular_spline", "tooth": 3.4, "shift_um": 8.0},
     "load_side_friction": {},
     "unbalance": {},
 }

@@ -1,0 +1,140 @@
+"""What a verdict says of teeth: which one is out of place, what a play means, the drive that has it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hdsim.diagnosis.verdict import NamedEffect, TeethFound
+from hdsim.drive.parameters import LumpedMesh, ToothedMesh
+from hdsim.drive.play_as_teeth import PlayAsTeeth, half_gap_of_play, play_as_teeth
+from hdsim.errors import PhysicsError
+from hdsim.estimate.found import FittedNumber
+
+if TYPE_CHECKING:
+    from hdsim.estimate.state import State
+
+#: Radians in an arc minute.
+_ARCMIN = math.pi / 10800.0
+#: Effects that change the mesh's half-gap, by the field that says by how much as an angle at the output, and
+#: the part of it that each tooth has.
+_GAPS = {"output_backlash": ("backlash_arcmin", 0.5), "mesh_preload": ("interference_arcmin", -1.0)}
+
+
+def teeth_found(effects: Sequence[NamedEffect], state: State) -> TeethFound | None:
+    """What the named effects say of the teeth; None where they say nothing.
+
+    Args:
+        effects: as named.
+        state: the model with them.
+    """
+    found = TeethFound()
+    for effect in effects:
+        if effect.name == "tooth_error" and "tooth" in effect.parameters:
+            _place(found, effect, state)
+        elif effect.name in _GAPS and isinstance(state.drive.mesh, ToothedMesh):
+            _gap(found, effect, state)
+        elif effect.name == "output_backlash" and isinstance(state.drive.mesh, LumpedMesh):
+            _play(found, effect, state)
+    return found if found.sentences else None
+
+
+def _place(found: TeethFound, effect: NamedEffect, state: State) -> None:
+    """The number of a tooth on its spline, from 0; its opposite one acts at the same time."""
+    number, member = effect.parameters["tooth"], str(effect.settings.get("member", "flexspline"))
+    geometry = state.drive.geometry
+    count = geometry.circular_spline_teeth if member == "circular_spline" else geometry.flexspline_teeth
+    turns = math.floor(number.value / (0.5 * count)) * 0.5 * count
+    value = number.value - turns
+    low, high = number.interval or (math.nan, math.nan)
+    interval = None if math.isnan(low) else (low - turns, high - turns)
+    found.member, found.tooth = member, FittedNumber(value=value, interval=interval)
+    found.opposite = (value + 0.5 * count) % count
+    ends = "" if interval is None else f" ({interval[0]:.0f} to {interval[1]:.0f})"
+    found.sentences.append(
+        f"It is tooth {value:.0f}{ends} of the {member.replace('_', ' ')}, counted from the one on the wave "
+        f"generator's lobe at zero angles, or the opposite one, tooth {found.opposite:.0f}: both lobes press "
+        "alike."
+    )
+
+
+def _gap(found: TeethFound, effect: NamedEffect, state: State) -> None:
+    """The mean half-gap of a mesh with teeth."""
+    mesh, drive = state.drive.mesh, state.drive
+    field, part = _GAPS[effect.name]
+    start = mesh.gap_factor * (
+        mesh.half_gap_m
+        if mesh.half_gap_m is not None
+        else float(np.mean(mesh.flanks.half_gaps(drive.geometry.flexspline_teeth, state.seed)))
+    )
+    change = effect.parameters[field]
+    ends = [change.value, *(change.interval or ())]
+    gaps = [1e6 * (start + 2.0 * part * half_gap_of_play(drive, end * _ARCMIN)) for end in ends]
+    found.half_gap_um = FittedNumber(
+        value=gaps[0], interval=(min(gaps[1:]), max(gaps[1:])) if gaps[1:] else None, start=1e6 * start
+    )
+    found.sentences.append(
+        f"The teeth's mean half-gap is {gaps[0]:.3g} um{_ends(found.half_gap_um)} instead of "
+        f"{1e6 * start:.3g}."
+    )
+
+
+def _play(found: TeethFound, effect: NamedEffect, state: State) -> None:
+    """What a play means in teeth, and the drive with teeth that has it."""
+    play = effect.parameters["backlash_arcmin"]
+    gaps = [
+        1e6 * half_gap_of_play(state.drive, end * _ARCMIN) for end in (play.value, *(play.interval or ()))
+    ]
+    found.half_gap_um = FittedNumber(value=gaps[0], interval=(gaps[1], gaps[2]) if gaps[1:] else None)
+    radius = 1e3 * state.drive.geometry.pitch_radius_m
+    said = (
+        f"Between teeth this play is a mean half-gap of {gaps[0]:.3g} um{_ends(found.half_gap_um)} at a "
+        f"pitch radius of {radius:.4g} mm"
+    )
+    try:
+        teeth = play_as_teeth(state.drive, play.value * _ARCMIN, seed=state.seed)
+    except PhysicsError as error:
+        found.sentences.append(f"{said}. No drive with teeth is written: {error}.")
+        return
+    found.roughness_m = teeth.roughness_m
+    found.sentences.append(f"{said}; by the law of the surfaces {_rough(teeth)}")
+
+
+def _rough(teeth: PlayAsTeeth) -> str:
+    flanks = " and ".join(
+        f"G = {value:.3g} m of the {name.replace('_', ' ')} (D = {teeth.dimensions[name]:.4g})"
+        for name, value in teeth.roughness_m.items()
+    )
+    said = f"that is {flanks}, flanks {teeth.heights:.3g} times as high as nominal ones."
+    if not teeth.rough:
+        said += (
+            " So rough ones would be plastic at every tooth load: it is wear, and the written drive has "
+            "nominal flanks worn apart."
+        )
+    return said
+
+
+def _ends(number: FittedNumber) -> str:
+    return f" ({number.interval[0]:.3g} to {number.interval[1]:.3g})" if number.interval else ""
+
+
+def toothed_changes(effects: Sequence[NamedEffect], state: State) -> dict[str, Any] | None:
+    """What turns the scenario that was found into one whose teeth have the play; None where there is none.
+
+    Args:
+        effects: as named.
+        state: the model with them.
+    """
+    play = next((effect for effect in effects if effect.name == "output_backlash"), None)
+    if play is None or not isinstance(state.drive.mesh, LumpedMesh):
+        return None
+    try:
+        teeth = play_as_teeth(
+            state.drive, play.parameters["backlash_arcmin"].value * _ARCMIN, seed=state.seed
+        )
+    except PhysicsError:
+        return None
+    return {"drive": teeth.changes, "effects": {"output_backlash": None}}
