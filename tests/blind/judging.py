@@ -79,19 +79,23 @@ def _put_in(line: Line) -> str:
 
 
 def _named(line: Line, truth: set[str], at: dict[str, Any] | None) -> bool:
-    """Whether a name is given, with a component of the right order, within a factor of two of its size."""
+    """Whether a name is given, with a component of the right order, within a factor of two of its size.
+
+    Another name that the data cannot tell from it counts with a component of that order only, in whatever
+    unit: two that can stand in for one another at some order are not the same thing at another.
+    """
     for effect, group in zip((line["verdict"] or {}).get("effects", []), groups(line), strict=True):
         if not _holds(group, truth):
             continue
         components = _components(effect)
-        if at is None or not components:
+        if at is None or (effect["name"] in truth and not components):
             return True
         for one in components:
-            size = one.get(at["field"])
+            size = one.get(at["field"]) if effect["name"] in truth else None
             if size is not None and at["field"] == "cogging_nm":
                 # What was put in is what the current reads; what is fitted is the torque behind its gain.
                 size *= _gain_of(line)
-            same = abs(one.get("order", 0.0) / at["order"] - 1.0) < 0.01 and one.get("per") != "output_turn"
+            same = abs(one["order"] / at["order"] - 1.0) < 0.01 and one.get("per") != "output_turn"
             if same and (size is None or 0.5 < abs(size / at["size"]) < 2.0):
                 return True
     return False
@@ -104,15 +108,23 @@ def _gain_of(line: Line) -> float:
 
 
 def _components(effect: dict[str, Any]) -> list[dict[str, Any]]:
-    """Components of an effect with their fields; what was fitted of them, where a line has no more."""
+    """All of an effect that has an order, with its fields; what was fitted, where a line has no more."""
     if effect.get("settings"):
-        return list(effect["settings"].get("components", []))
+        return _with_order(effect["settings"])
     found: dict[str, dict[str, Any]] = {}
     for path, number in effect["parameters"].items():
         one, _, field = path.rpartition(".")
         if one:
             found.setdefault(one, {})[field] = number["value"]
     return [one for one in found.values() if "order" in one]
+
+
+def _with_order(settings: Any) -> list[dict[str, Any]]:
+    """The sections of an effect's settings that have an order, however deep."""
+    if isinstance(settings, dict):
+        own = [settings] if "order" in settings else []
+        return own + [one for part in settings.values() for one in _with_order(part)]
+    return [one for part in settings for one in _with_order(part)] if isinstance(settings, list) else []
 
 
 def _holds(group: list[str], wanted: set[str]) -> bool:

@@ -216,3 +216,24 @@ def test_the_size_of_a_motors_ripple_is_what_its_current_reads():
     # A component of the output's turn is another order.
     ripple["per"] = "output_turn"
     assert outcome(one) == "nothing"
+
+
+@pytest.mark.parametrize(
+    ("order", "before", "wanted"), [(4.0, 2.0, "right"), (2.0, 2.0, "nothing"), (4.0, 4.0, "nothing")]
+)
+def test_a_name_that_stands_in_for_another_does_so_at_its_own_order_only(order, before, wanted):
+    # The bare joint's sensor ripples, and its data cannot tell that from a kinematic error of the same order.
+    ripple = {"output_angle": {"ripple": [{"order": before, "amplitude_arcsec": 30.0, "phase_deg": 10.0}]}}
+    own = {"name": "sensors", "indistinguishable_from": ["kinematic_error"], "confidence": 0.9}
+    one = real("effect", ("kinematic_error", order, 9.0), order=order)
+    one["without"]["verdict"]["effects"] = [own | {"parameters": {}, "settings": ripple}]
+    assert outcome(one) == wanted
+
+
+@pytest.mark.parametrize(("order", "wanted"), [(4.0, "right"), (2.0, "nothing")])
+def test_a_stand_in_with_what_was_put_in_needs_its_order(order, wanted):
+    ripple = {"output_angle": {"ripple": [{"order": order, "amplitude_arcsec": 30.0, "phase_deg": 10.0}]}}
+    named = {"name": "sensors", "indistinguishable_from": ["kinematic_error"], "confidence": 0.9}
+    one = real("effect", OWN, order=4.0, before=[OWN])
+    one["verdict"]["effects"] = [named | {"parameters": {}, "settings": ripple}]
+    assert outcome(one) == wanted
