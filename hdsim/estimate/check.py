@@ -1,6 +1,7 @@
 """Step 1, check the data: what is missing, wrong or suspect in a record, with the evidence.
 
-Noise: ``hdsim.estimate.noise``. Spikes and saturation: ``hdsim.estimate.spikes``. Units, signs and ratios:
+Noise: ``hdsim.estimate.noise``. Spikes and saturation: ``hdsim.estimate.spikes``. Repeated and lost samples:
+``hdsim.estimate.slips``. Units, signs and ratios:
 ``hdsim.estimate.factors``.
 """
 
@@ -14,6 +15,7 @@ from hdsim.estimate.data_problems import Check, Problem, Severity
 from hdsim.estimate.factors import compare_channels
 from hdsim.estimate.noise import noise_floor
 from hdsim.estimate.records import LARGEST, Array, Record
+from hdsim.estimate.slips import MOST, around, find_slips
 from hdsim.estimate.spikes import find_spikes, largest_jump, saturated
 
 #: Steps of time longer than this many medians are gaps; from this many seconds on nobody knows the motion.
@@ -58,6 +60,7 @@ def check_record(record: Record, ratio: float, alive: Collection[str] = ()) -> C
     _clock(record, found)
     for channel, values in record.channels.items():
         _channel(record, channel, values, found)
+    _slips(record, found)
     _still(record, found, alive)
     compare_channels(record, ratio, found)
     return found
@@ -137,6 +140,25 @@ def _channel(record: Record, channel: str, values: Array, found: Check) -> None:
             )
             record.trusted[channel] = trusted = trusted & ~stuck
     found.noise[channel] = noise_floor(values, trusted)
+
+
+def _slips(record: Record, found: Check) -> None:
+    """Take what a log has repeated or lost out of the motor's torque, which accelerates the rotor."""
+    for angle in ("motor_angle", "output_angle"):
+        rate = record.rate(angle) if angle in record.readable else None
+        if rate is None or "motor_torque" not in record.trusted:
+            continue
+        slips = find_slips(record.time, record.filled(angle), rate[0], record.trusted[angle] & rate[1])
+        if not slips.any():
+            continue
+        near, count = around(slips), int(slips.sum())
+        message = f"{count} samples are repeated or lost, by what its velocity says of the way between them"
+        if near.mean() > MOST:
+            message += "; too many to be left out"
+        else:
+            message += f"; {int(near.sum())} samples of motor_torque around them are masked"
+            record.trusted["motor_torque"] = record.trusted["motor_torque"] & ~near
+        found.problems.append(Problem(record.name, angle, "slips", "warning", message, count))
 
 
 def _still(record: Record, found: Check, alive: Collection[str]) -> None:

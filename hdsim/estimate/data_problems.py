@@ -15,7 +15,7 @@ class Problem:
     Attributes:
         record: name of the record.
         channel: name of the channel, or ``time``.
-        kind: gap, missing, spikes, dead, saturated, clock, unit, sign, ratio, side, drive, one way,
+        kind: gap, missing, spikes, slips, dead, saturated, clock, unit, sign, ratio, side, drive, one way,
             zero.
         severity: an ``error`` stops a diagnosis.
         message: what was found, with the numbers that say so.

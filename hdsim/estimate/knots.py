@@ -56,7 +56,7 @@ def least_squares_spline(time: Array, values: Array, knots: Array, rate: Rate | 
     design = BSpline.design_matrix(time, knots, 3)
     parts, at = design.data.reshape(-1, 4), design.indices.reshape(-1, 4)
     if rate is not None:
-        slopes = rate.weight * _slopes(time, knots, at) * rate.trusted[:, None]
+        slopes = rate.weight * slopes_of(time, knots, at) * rate.trusted[:, None]
         parts, at = np.vstack([parts, slopes]), np.vstack([at, at])
         values = np.concatenate([values, np.where(rate.trusted, rate.weight * rate.values, 0.0)])
     band, right = np.zeros((4, c)), np.zeros(c)
@@ -70,7 +70,7 @@ def least_squares_spline(time: Array, values: Array, knots: Array, rate: Rate | 
     return BSpline(knots, cho_solve_banded((factor, True), right), 3)
 
 
-def _slopes(time: Array, knots: Array, at: Array) -> Array:
+def slopes_of(time: Array, knots: Array, at: Array) -> Array:
     """Derivatives of the four cubic B-splines at each time, shape (n, 4): de Boor, ch. X, Eq. 8.
 
     Args:

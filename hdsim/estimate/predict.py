@@ -22,7 +22,7 @@ from hdsim.estimate.knots import least_squares_spline
 from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import SlowPart, signal, smoothed
+from hdsim.estimate.spline import SlowPart, pieces_of, signal, smoothed, spline_through
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
@@ -142,7 +142,8 @@ class Predictor:
         values = self._reading = record.filled(plan.motion) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
-        breaks, coefficients = smoothed(record.time, values, motion=moves, step=step, rate=rate)
+        spline, self._likeliest = spline_through(record.time, values, motion=moves, step=step, rate=rate)
+        breaks, coefficients = pieces_of(spline)
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
         self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
         coefficients = coefficients * self._factor
@@ -198,8 +199,12 @@ class Predictor:
         Args:
             seed: of the draw.
         """
-        from scipy.interpolate import PPoly
-
+        found = copy(self)
+        if self._likeliest is not None:
+            _, coefficients = pieces_of(self._likeliest.disturbed(np.random.default_rng([seed, 11])))
+            found._coefficients = self._factor * coefficients
+            found.turn(0.0)
+            return found
         time, raw = self.record.time, self._reading
         smooth = self.motor_angle / self._factor
         step = self._step(self.plan.motion)
@@ -211,13 +216,11 @@ class Predictor:
         drawn = np.round(drawn / step) * step if step > 0 else drawn
         breaks = self._breaks
         knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
-        found = copy(self)
         try:
-            pieces = PPoly.from_spline(least_squares_spline(time, drawn, knots))
+            again = least_squares_spline(time, drawn, knots)
         except (ValueError, np.linalg.LinAlgError):
             return found  # a knot a sample, as of a motion without noise
-        keep = np.diff(pieces.x) > 0
-        found._coefficients = self._factor * np.asarray(pieces.c[::-1][:, keep])
+        found._coefficients = self._factor * pieces_of(again)[1]
         found.turn(0.0)
         return found
 

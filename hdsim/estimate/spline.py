@@ -8,12 +8,13 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.estimate.knots import SPACINGS, Rate, least_squares_spline, uniform
+from hdsim.estimate.motion import Motion
 from hdsim.estimate.noise import quantisation_step
 from hdsim.estimate.rates import beside_rate
 from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+    from scipy.interpolate import BSpline, CubicSpline
 
     from hdsim.actuation.signal_data import SignalData
 
@@ -33,7 +34,29 @@ def smoothed(
     step: float | None = None,
     rate: tuple[Array, Mask] | None = None,
 ) -> tuple[Array, Array]:
-    """Knots (k + 1,) and cubic coefficients (4, k) of the spline that predicts left-out samples best.
+    """Knots (k + 1,) and cubic coefficients (4, k) of the spline that ``spline_through`` takes."""
+    return pieces_of(spline_through(time, values, motion=motion, step=step, rate=rate)[0])
+
+
+def pieces_of(spline: BSpline | CubicSpline) -> tuple[Array, Array]:
+    """Knots (k + 1,) and cubic coefficients (4, k), the constant terms first."""
+    from scipy.interpolate import BSpline, PPoly
+
+    pieces = PPoly.from_spline(spline) if isinstance(spline, BSpline) else spline
+    keep = np.diff(pieces.x) > 0
+    breaks = np.concatenate([pieces.x[:-1][keep], [pieces.x[-1]]])
+    return breaks, np.asarray(pieces.c[::-1][:, keep])
+
+
+def spline_through(
+    time: Array,
+    values: Array,
+    *,
+    motion: bool = False,
+    step: float | None = None,
+    rate: tuple[Array, Mask] | None = None,
+) -> tuple[BSpline | CubicSpline, Motion | None]:
+    """The spline that predicts left-out samples best, and the motion that it is the mean of, if any.
 
     Generalised cross-validation (Craven and Wahba 1979, Numerische Mathematik 31:377) of uniform
     least-squares splines: coarse knots when the data are noisy, the interpolating spline when they are not.
@@ -52,29 +75,28 @@ def smoothed(
         step: q of the sensor; found in the values when None.
         rate: their measured derivative in any unit, shape (n,), and which samples of it count, shape (n,).
     """
-    from scipy.interpolate import CubicSpline, PPoly
+    from scipy.interpolate import CubicSpline
 
+    step = quantisation_step(values) if step is None else step
     _, chosen = best_spline(time, values, step)
     if chosen is None:
-        exact = CubicSpline(time, values)
-        return np.asarray(exact.x), np.asarray(exact.c[::-1])
-    beside: Rate | None = None
+        return CubicSpline(time, values), None
+    beside: Rate | Motion | None = None
     if rate is not None:
-        chosen, beside = beside_rate(time, values, chosen, *rate)
+        chosen, beside = beside_rate(time, values, chosen, *rate, step)
+    if isinstance(beside, Motion):
+        return chosen, beside
     if motion:
         jumping = _jumping(time, values, chosen, beside)
         if jumping is not None and _score(time, values, jumping, beside) < _score(
             time, values, chosen, beside
         ):
             chosen = jumping
-    pieces_of = PPoly.from_spline(chosen)
-    keep = np.diff(pieces_of.x) > 0
-    breaks = np.concatenate([pieces_of.x[:-1][keep], [time[-1]]])
-    return breaks, np.asarray(pieces_of.c[::-1][:, keep])
+    return chosen, None
 
 
 def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[float, BSpline | None]:
-    """The least-squares spline that ``smoothed`` takes, with its score; None where none can be made."""
+    """The least-squares spline that ``spline_through`` takes, with its score; None where none can be made."""
     n = len(time)
     allowed = STEPS_ALLOW * (quantisation_step(values) if step is None else step) / np.sqrt(12.0)
     best, chosen = np.inf, None

@@ -143,3 +143,49 @@ def test_a_recording_too_short_or_of_other_channels_is_refused():
     t = np.arange(1000) / 10
     with pytest.raises(InputError, match="no channel of motor_angle"):
         record_from(Recording({"state": Table(t, {"speed": Column(t, "rad")})}))
+
+
+def slipping(seed=0):
+    """An angle and its velocity at 1 kHz, and the samples at which its log has repeated or lost one."""
+    rng = np.random.default_rng(seed)
+    seen, slips = np.arange(4000), np.zeros(4000, dtype=bool)
+    for start in range(400, 3800, 190):
+        seen[start:] -= 1  # repeated
+        seen[start + 60 :] += 1  # lost
+        slips[[start, start + 60]] = True
+    t = np.arange(4000) / 1000.0
+    angle = (1.0 - np.cos(2 * np.pi * 0.35 * t))[seen] + 1e-5 * rng.standard_normal(4000)
+    velocity = (2 * np.pi * 0.35 * np.sin(2 * np.pi * 0.35 * t))[seen] + 2e-3 * rng.standard_normal(4000)
+    return angle, velocity, slips
+
+
+def test_repeated_and_lost_samples_are_left_out_of_the_motors_torque():
+    angle, velocity, slips = slipping()
+    torque = velocity + 0.01 * np.random.default_rng(1).standard_normal(4000)
+    r = record(output_angle=angle, motor_angle=-100 * angle, output_velocity=velocity, motor_torque=torque)
+    [found] = [p for p in check_record(r, RATIO).problems if p.kind == "slips"]
+    fast = slips & (np.abs(velocity) > 0.3)
+    assert found.channel == "output_angle"
+    assert fast.sum() <= found.count <= slips.sum()
+    assert not r.trusted["motor_torque"][fast].any()
+    assert r.trusted["motor_torque"].sum() > 4000 - 21 * found.count - 1
+    assert r.trusted["output_velocity"].all()
+
+
+@pytest.mark.parametrize("read", ["noisy", "quantised", "filtered"])
+def test_an_angle_and_a_velocity_that_agree_have_no_slips(read):
+    t = np.arange(4000) / 1000.0
+    rng = np.random.default_rng(3)
+    angle = 0.3 * np.sin(2 * np.pi * 0.7 * t) + 0.1 * np.abs(np.sin(2 * np.pi * 0.3 * t))
+    velocity = np.gradient(angle, t)
+    if read == "noisy":
+        angle, velocity = (
+            angle + 1e-5 * rng.standard_normal(4000),
+            velocity + 5e-3 * rng.standard_normal(4000),
+        )
+    elif read == "quantised":
+        angle, velocity = np.round(angle / 1e-4) * 1e-4, np.round(velocity / 0.01) * 0.01
+    else:
+        velocity = np.convolve(velocity, np.ones(15) / 15)[:4000]
+    r = record(output_angle=angle, output_velocity=velocity, motor_torque=rng.standard_normal(4000))
+    assert not [p for p in check_record(r, RATIO).problems if p.kind == "slips"]
