@@ -7,7 +7,7 @@ STAMP  := $(VENV)/installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-fast check setup lock schema picture blind clean
+.PHONY: help run test test-fast check setup lock schema picture site blind clean
 
 help:
 	@echo "make run        simulate the seed drive; the log and the picture go to logs/"
@@ -16,8 +16,9 @@ help:
 	@echo "make setup      only install what is needed into $(VENV)"
 	@echo "make lock       resolve the development set anew (needs uv)"
 	@echo "make schema     write the JSON schemas of what people write anew"
+	@echo "make site       build the documentation into build/site, its gallery run, a warning being an error"
 	@echo "make blind      hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
-	@echo "make picture    draw docs/images/seed_move.png and diagnose_report.webp anew (the latter needs Chromium)"
+	@echo "make picture    draw docs/images/seed_move.png and the pages' pictures anew (some need Chromium)"
 	@echo "make clean      remove $(VENV), caches and logs"
 
 setup: $(STAMP)
@@ -60,11 +61,16 @@ blind: $(STAMP)
 	$(BIN)/python tests/blind store --results results/blind.jsonl
 	$(BIN)/python tests/blind page
 
+site: $(STAMP)
+	$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doctrees docs build/site
+	@echo "the pages are in build/site/index.html"
+
 picture: run
 	cp logs/seed_move.png docs/images/seed_move.png
 	$(BIN)/python docs/images/diagnose_report.py
+	$(BIN)/python docs/images/tutorials.py
 
 clean:
-	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist docs/generated
 	rm -f logs/*.mcap logs/*.png logs/*.partial
 	find hdsim tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
