@@ -164,7 +164,9 @@ def screen(
             first.others.append(one)
     for name in catalogue():
         if name not in best:
-            found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
+            found.skipped.setdefault(
+                name, "no effect on these channels, or a channel that it needs is missing"
+            )
     found.ranked += best.values()
     _remarkable_first(found, shares)
     return found
