@@ -32,7 +32,8 @@ def confusions(verdict: Verdict) -> str:
         listed = ", ".join(f"{title_of(name)} ({percent(share)})" for name, share in verdict.suspects.items())
         said = "Effects that explain a part of the residual, too little to be identified"
         body += f"<p>{said}: {html.escape(listed)}.</p>"
-    return section("Alternatives", body, "warn") if body else ""
+    title = "Alternatives" if any(one.indistinguishable_from for one in verdict.effects) else "Candidates"
+    return section(title, body, "warn") if body else ""
 
 
 def following(verdict: Verdict) -> str:

@@ -127,7 +127,7 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
     last, unit = split_unit(parts[-1])
     term = _PARAMETERS.get(".".join([*parts[:-1], last.replace(" ", "_")]))
     if term is not None:
-        return term, written(unit)
+        return term, units.printed(unit)
     sections: list[str] = []
     here: Any = settings
     for part in parts[:-1]:
@@ -141,13 +141,7 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
             sections[-1:] = [f"order {here['order']:g}{turn}"]
         elif part != "drive":
             sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
-    return ", ".join([*sections, spoken(last)]), written(unit)
-
-
-def written(unit: str) -> str:
-    """A unit with the signs of print: ``kg m^2`` is kg m²."""
-    unit = "µm" if unit == "um" else unit
-    return unit.replace("^2", "²").replace("^3", "³").replace("degC", "°C")
+    return ", ".join([*sections, spoken(last)]), units.printed(unit)
 
 
 def unit_of(gap: Gap) -> units.Unit:
