@@ -123,8 +123,8 @@ def estimate(
 ) -> Estimation:
     """Estimate a scenario's parameters from measured records; ``hdsim.fit`` takes files too.
 
-        free: paths of the only free parameters; all that the model declares when empty. Those of a group
-    that of a locked drive, belong to each.
+    All records share the parameters and the torque sensors' zeros (``zeros``); an angle's zero, and that of a
+    locked drive, belong to each record.
 
     Args:
         measured: records that the fit uses.
