@@ -152,7 +152,7 @@ def screen(
     alive |= {place.coordinate for place in places if place.share > TRACELESS}
     look([added for added in many if _home(added.effect) in alive or not places])
     for name in {added.effect for added in many if _home(added.effect) not in alive and places}:
-        found.skipped[name] = f"nothing lives in the {_home(name).replace('_', ' ')}"
+        found.skipped[name] = f"no residual depends on the {_home(name).replace('_', ' ')}"
     for times in range(REFINED):
         most = max((one.share.share for one in kinds.values()), default=0.0)
         worth = [one for one in kinds.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
