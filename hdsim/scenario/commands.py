@@ -27,8 +27,8 @@ KINDS = {
 def check(files: tuple[str, ...]) -> None:
     """Check files: one line for every mistake, or OK, a summary and warnings.
 
-    The kind of a file follows from its keys: a mapping has channels, a study a base or metrics, a load cycle phases;
-    all others are scenarios.
+    The kind of a file follows from its keys: a mapping has channels, a study a base or metrics, a load cycle
+    phases; all others are scenarios.
     """
     problems: list[Problem] = []
     for file in files:
