@@ -154,7 +154,7 @@ def screen(
     alive |= {place.coordinate for place in places if place.share > TRACELESS}
     look([added for added in many if _home(added.effect) in alive or not places])
     for name in {added.effect for added in many if _home(added.effect) not in alive and places}:
-        found.skipped[name] = f"nothing lives in the {_home(name).replace('_', ' ')}"
+        found.skipped[name] = f"no residual depends on the {_home(name).replace('_', ' ')}"
     for times in range(REFINED):
         most = max((one.share.share for one in kinds.values()), default=0.0)
         worth = [one for one in kinds.values() if one.share.share >= max(REFINABLE * most, 1e-3)]
@@ -166,7 +166,9 @@ def screen(
             first.others.append(one)
     for name in catalogue():
         if name not in best:
-            found.skipped.setdefault(name, "leaves no trace in these channels, or they lack what it needs")
+            found.skipped.setdefault(
+                name, "no effect on these channels, or a channel that it needs is missing"
+            )
     found.ranked += best.values()
     _remarkable_first(found, shares)
     return found

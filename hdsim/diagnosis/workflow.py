@@ -51,7 +51,7 @@ LEAST_REST = 0.02
 
 @dataclass
 class Diagnosis:
-    """Everything that a diagnosis found; ``verdict`` is its summary, and rests on ``evidence`` alone."""
+    """The result of a diagnosis; ``verdict`` is its summary and follows from ``evidence`` alone."""
 
     verdict: Verdict
     evidence: Evidence
@@ -92,14 +92,14 @@ def diagnose(
     """Find what a model is missing.
 
     Args:
-        measured: records that fits may see.
-        scenario: the model; what it commands does not matter, its motion is the measured one.
+        measured: records that the fits may use.
+        scenario: the model; its command does not matter, as the measured motion is prescribed.
         holdout: validation records, used in no fit; parts of ``measured`` when there are none.
-        load: where the load's torque comes from; ``output_torque`` takes what the joint's sensor measures.
+        load: source of the load torque; ``output_torque`` takes the reading of the joint's sensor.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
-        force: go on in spite of errors in the data.
-        black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
-        on_step: told what is being done.
+        force: continue in spite of errors in the data.
+        black_box: also fit gradient-boosted trees as a baseline.
+        on_step: called with the name of each step.
 
     Returns:
         The diagnosis with its verdict.

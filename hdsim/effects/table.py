@@ -203,7 +203,7 @@ class Table(Effect):
 
     title: ClassVar[str] = "tabulated curve"
     source: ClassVar[str] = (
-        "none: the curve of an unidentified effect; interpolation: de Boor 2001, A Practical Guide to Splines, "
+        "none: an unidentified effect as a curve; interpolation: de Boor 2001, A Practical Guide to Splines, "
         "ch. IV; the default, the pull of a cable loop, is an estimate"
     )
     signature: ClassVar[Signature] = Signature(

@@ -1,8 +1,8 @@
-"""Numbers of a model from measured data: records, noise, prediction, fit, intervals.
+"""Parameters of a model from measured data: records, noise, prediction, fit, confidence intervals.
 
 >>> from hdsim.estimate import estimate, solve
->>> found = estimate([record], scenario)  # a drive's numbers
->>> found = solve(problem)  # anybody's residual, see hdsim.estimate.problem
+>>> found = estimate([record], scenario)  # a drive's parameters
+>>> found = solve(problem)  # your own residual, see hdsim.estimate.problem
 """
 
 from __future__ import annotations

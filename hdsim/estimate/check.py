@@ -79,7 +79,7 @@ def _clock(record: Record, found: Check) -> None:
         if steps.max() > LONGEST_GAP_S:
             severity = "error"
             message += (
-                f"; nothing tells the motion across more than {LONGEST_GAP_S:g} s: cut the recording there"
+                f"; the motion is unknown across more than {LONGEST_GAP_S:g} s: cut the recording there"
             )
         found.problems.append(Problem(record.name, "time", "gap", severity, message, int(gaps.sum())))
     if period > 1.0 / SLOWEST_HZ:

@@ -40,11 +40,11 @@ ASKED_PRIOR = 0.7
 
 @dataclass(frozen=True)
 class Reading:
-    """What belongs to one record alone.
+    """Offsets and zeros of one record.
 
     Attributes:
         record: its name.
-        held: whether only the proof has seen it.
+        held: whether it is a validation record.
         offsets: measured less predicted, mean, of each channel, in SI units: the sensors' zeros.
         zero: of a locked drive the motor's angle at which it carries nothing, beside where the record's own
             torques put it, rad; None of one that turns.
@@ -58,16 +58,16 @@ class Reading:
 
 @dataclass
 class Estimation:
-    """A scenario's numbers as measured records have them.
+    """Estimates of a scenario's parameters from measured records.
 
     Attributes:
-        intervals: every number that was free, with its 95 % interval, or what it is tied to.
-        names: of the numbers that were fitted, as in ``correlation``.
+        intervals: every free parameter, with its 95 % interval, or the parameters it is confounded with.
+        names: of the estimated parameters, as in ``correlation``.
         correlation: shape (f, f).
-        directions: combinations of all free numbers that the data see or not, the best seen first.
-        left: part of its prior spread that is left of each fitted number.
-        gap: held-out gap of each channel, before and after.
-        readings: sensors' offsets and locked zeros, by record.
+        directions: combinations of all free parameters, identifiable or not, the best determined first.
+        left: posterior over prior spread of each estimated parameter.
+        gap: held-out RMS residual of each channel, before and after.
+        readings: offsets of the sensors and zeros of a locked drive, by record.
         problems: of the data.
         bench: the measured series.
         start: the model as given.
@@ -92,12 +92,12 @@ class Estimation:
 
     @property
     def moved(self) -> list[str]:
-        """Numbers whose start lies outside of their interval."""
+        """Parameters whose interval excludes the model's value."""
         return [interval.name for interval in self.intervals if interval.moved]
 
     @property
     def changes(self) -> dict[str, float]:
-        """The scenario's numbers that the fit moved, by their paths: for ``Scenario.with_``."""
+        """The parameters that the fit changed, by their paths: for ``Scenario.with_``."""
         return scenario_changes(self.fit.state, self.refit.freedoms, self.start)
 
     def _repr_html_(self) -> str:
@@ -121,24 +121,24 @@ def estimate(
     black_box: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
-    """Fit a scenario's numbers to measured records; ``hdsim.fit`` takes files too.
+    """Estimate a scenario's parameters from measured records; ``hdsim.fit`` takes files too.
 
-    The numbers are shared by all records, and so are the torque sensors' zeros (``zeros``); an angle's, and
-    that of a locked drive, belong to each.
+    All records share the parameters and the torque sensors' zeros (``zeros``); an angle's zero, and that of a
+    locked drive, belong to each record.
 
     Args:
-        measured: records that the fit sees.
+        measured: records that the fit uses.
         scenario: the model; what it commands does not matter, its motion is the measured one.
         holdout: validation records, used in no fit; parts of ``measured`` when there are none.
-        free: paths of the only numbers that move; all that the model declares when empty. Numbers of a group
-            that are named together scale together.
-        fix: paths of numbers that do not.
-        apart: paths of numbers of a group that move by themselves.
-        load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
+        free: paths of the only free parameters; all that the model declares when empty. Parameters of a group
+            that are given together scale together.
+        fix: paths of parameters that stay fixed.
+        apart: paths of parameters of a group that are estimated by themselves.
+        load: source of the load torque; ``load_torque`` when that is measured, else the scenario.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
-        force: go on in spite of errors in the data.
-        black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
-        on_step: told what is being done.
+        force: continue in spite of errors in the data.
+        black_box: also fit gradient-boosted trees as a baseline.
+        on_step: called with the name of each step.
 
     Raises:
         InputError: the data cannot answer the question, or are suspect (see ``force``), or a path is none, or

@@ -21,7 +21,7 @@ _FACTORS = {
     2.0 * math.pi: "in revolutions",
     10800.0 / math.pi: "in arcmin",
     648000.0 / math.pi: "in arcsec",
-    1000.0: "off by 1000 in its unit (ms for s, mN m for N m, mrad for rad)",
+    1000.0: "wrong by 1000 in its unit (ms for s, mN m for N m, mrad for rad)",
 }
 _RATES = _FACTORS | {60.0 / (2.0 * math.pi): "in rev/min"}
 
@@ -67,7 +67,7 @@ def explain(
     kind, value, text = min(same, key=lambda cause: away(cause[1]))
     if away(value) >= reach:
         kind, text = "ratio", "of another drive, or in a wrong unit"
-    turned = "with its sign turned" if factor * (ratio if kind == "side" else 1.0) < 0 else ""
+    turned = "with its sign reversed" if factor * (ratio if kind == "side" else 1.0) < 0 else ""
     return kind, " ".join(part for part in (text, turned) if part)
 
 

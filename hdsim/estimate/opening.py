@@ -42,7 +42,7 @@ def checked(
     errors = [problem for check in checks for problem in check.errors]
     if errors and not force:
         lines = "\n".join(f"{p.record}: {p.channel}: {p.kind}: {p.message}" for p in errors)
-        raise InputError(f"{lines}\nmend the mapping or the data, or go on in spite of it (--force)")
+        raise InputError(f"{lines}\ncorrect the mapping or the data, or continue in spite of it (--force)")
     return records, held, checks
 
 

@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 #: Fewest samples, and shortest record, that a diagnosis can work with.
 FEWEST_SAMPLES, SHORTEST_S = 200, 0.5
 _WHY_SO_LONG = (
-    "its start is not compared, a third is held out for the proof, and the rest is cut into 18 blocks"
+    "its start is not compared, a third is held out for validation, and the rest is cut into 18 blocks"
 )
 #: Least part of its samples that a record has to have, of those that its rate and its duration promise.
 SPARSEST = 0.1

@@ -32,11 +32,11 @@ NAMED = 0.3
 
 @dataclass(frozen=True)
 class Direction:
-    """A combination of the numbers, in units of their prior spreads, that the data see or not.
+    """A combination of the parameters, in units of their prior spreads, and whether it is identifiable.
 
     Attributes:
-        spread: ratio of the standard deviation that is left of it to the one before the data.
-        parts: share of each number that takes part, by name; their squares sum to at most 1.
+        spread: ratio of its standard deviation after the data to that before.
+        parts: share of each parameter that takes part, by name; their squares sum to at most 1.
     """
 
     spread: float
@@ -53,13 +53,13 @@ class Solution:
     """A solved problem.
 
     Attributes:
-        names: of the numbers.
-        x: their values, shape (p,); those that the data do not determine are where they started.
+        names: of the parameters.
+        x: their estimates, shape (p,); those that are not identifiable keep their start values.
         determined: which ones the data determine, shape (p,).
         covariance: shape (p, p), scaled so that two standard deviations are a 95 % interval (Student's t
-            with the blocks that tell of a number); NaN where a number is not determined.
-        ties: numbers that each undetermined one cannot be told from.
-        directions: all that the data see or not, the best seen first.
+            with the blocks that carry information on a parameter); NaN where it is not identifiable.
+        ties: for each parameter that is not identifiable, those it is confounded with.
+        directions: all combinations, identifiable or not, the best determined first.
         rest: the residual, shape (rows,).
     """
 
@@ -73,13 +73,13 @@ class Solution:
 
     @property
     def intervals(self) -> Array:
-        """95 % intervals, shape (p, 2); NaN where a number is not determined."""
+        """95 % intervals, shape (p, 2); NaN where a parameter is not identifiable."""
         half = 2.0 * np.sqrt(np.diag(self.covariance))
         return np.column_stack([self.x - half, self.x + half])
 
     @property
     def correlation(self) -> Array:
-        """Of the numbers, shape (p, p)."""
+        """Of the estimates, shape (p, p)."""
         return correlations(self.covariance)
 
 
@@ -90,7 +90,7 @@ def correlations(covariance: Array) -> Array:
 
 
 def directions(columns: Array, priors: Array, power: float, names: list[str]) -> list[Direction]:
-    """What the data see of each combination of numbers (singular vectors of the scaled sensitivities).
+    """How well the data determine each combination of parameters (singular vectors of the sensitivities).
 
     Args:
         columns: sensitivities of the residual, shape (rows, p).

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.option(
     "--speed",
     type=click.FloatRange(1e-4, 1e4),
-    help="Multiple of real time [default: the layout's, which suits the run].",
+    help="Multiple of real time [default: that of the layout].",
 )
 @click.option(
     "--port",

@@ -14,7 +14,7 @@ from hdsim.console import reading
 @click.option(
     "--mapping",
     type=click.Path(path_type=Path),
-    help="YAML file that says which column is what, in which unit.",
+    help="YAML file with channel and unit of each column.",
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="The log [default: logs/DATA.mcap].")
 def import_data(data: Path, mapping: Path | None, output: Path | None) -> None:

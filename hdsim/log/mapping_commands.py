@@ -21,21 +21,21 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     default=Path("mapping.yaml"),
     show_default=True,
-    help="The mapping.",
+    help="File of the mapping.",
 )
 @click.option(
     "--base",
     type=click.Path(path_type=Path),
     default=Path("base.yaml"),
     show_default=True,
-    help="A base scenario of that ratio.",
+    help="File of the base scenario.",
 )
-@click.option("--axis", type=int, help="Number of the axis, of a file with several.")
+@click.option("--axis", type=int, help="Number of the axis, in a file with several.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE",
-              help="Say what the file does not: ratio=100, time.unit=ms, COLUMN.channel=motor_angle, "
+              help="Give what the file leaves open: ratio=100, time.unit=ms, COLUMN.channel=motor_angle, "
                    "COLUMN.unit=deg, COLUMN.torque_constant_nm_per_a=0.1. Repeatable.")  # fmt: skip
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal mark, where the file leaves it open.")
-@click.option("--force", is_flag=True, help="Write over files that are there.")
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
 def mapping(
     data: Path,
     output: Path,
@@ -45,10 +45,10 @@ def mapping(
     decimal: str | None,
     force: bool,
 ) -> int:
-    """Look at the recording FILE; write a mapping (which column is what, in which unit) and a base scenario.
+    """Draft a mapping of the recording FILE (channel and unit of each column), and a base scenario.
 
-    Behind every key of the mapping stands why. On a terminal you are asked for what the file does not tell;
-    else it stays a comment in the mapping, is listed, and the exit status is 1.
+    Each key of the mapping has its reason in a comment. On a terminal, keys that the file leaves open are
+    asked for; otherwise they stay comments in the mapping, are listed, and the exit status is 1.
     """
     from hdsim.errors import InputError
     from hdsim.log.guess.base import base_scenario
@@ -109,8 +109,9 @@ def _asked(found: Draft, said: dict[str, str]) -> dict[str, str]:
     if sys.stdin.isatty() and sys.stderr.isatty():
         for question in found.open:
             if question.key and question.key not in said and "COLUMN" not in question.key:
-                words = f"{question.text}; such as {question.example}, or - to leave it open"
-                answer = click.prompt(words, default="-", err=True).strip()
+                text = question.text[:1].upper() + question.text[1:]
+                words = f"{text} (for example {question.example}; - leaves it open)"
+                answer = click.prompt(words, default="-", show_default=False, err=True).strip()
                 if answer != "-":
                     answers[question.key] = answer
     return answers
@@ -123,7 +124,7 @@ def _show(found: Draft) -> None:
     from hdsim.log.guess.findings import Ground
 
     colours = {Ground.ASSUMED: "dark_orange", Ground.OPEN: "bold red"}
-    table = Table("key", "value", "ground", "why", title="; ".join(found.notes), title_justify="left",
+    table = Table("key", "value", "ground", "reason", title="; ".join(found.notes), title_justify="left",
                   title_style="", box=None, pad_edge=False)  # fmt: skip
     rows = [("ratio", found.ratio)] if found.ratio is not None else []
     rows += [(f"time {key}", answer) for key, answer in found.time.items()]

@@ -89,7 +89,7 @@ def study_html(result: StudyResult) -> str:
     failed = found.columns["status"].values.count("failed")
     facts = {
         "runs": f"{len(found)}" + (f", {failed} of them failed" if failed else ""),
-        "varied": ", ".join(plan.study.parameters) or "the teeth and the noise alone",
+        "varied": ", ".join(plan.study.parameters) or "tooth surfaces and noise only",
         "metrics": ", ".join(plan.study.metrics),
     }
     summaries = summarise(plan, found)
@@ -100,17 +100,19 @@ def study_html(result: StudyResult) -> str:
             [
                 spoken(one.metric),
                 words(one.point),
-                one.unit,
+                units.printed(one.unit),
                 str(one.runs),
                 shown(one.mean.value),
                 f"{shown(one.mean.low)} to {shown(one.mean.high)}" if many else "",
                 f"{shown(one.low)} to {shown(one.high.value)}" if many else "",
             ]
         )
-    head = ("metric", "at", "unit", "runs", "mean", f"{plan.study.confidence:.0%} interval", "5 % to 95 %")
-    body = table(head, rows, (3, 4))
+    head = ["metric", "at", "unit", "runs", "mean"]
+    if any(one.runs > 1 for one in summaries[:MOST_ROWS]):
+        head += [f"{100 * plan.study.confidence:g} % interval", "5 % to 95 %"]
+    body = table(head, [row[: len(head)] for row in rows], (3, 4))
     if len(summaries) > MOST_ROWS:
-        body += f"<p>... and {len(summaries) - MOST_ROWS} more</p>"
+        body += f"<p>and {len(summaries) - MOST_ROWS} more</p>"
     try:
         sensitivities = indices(plan, found) if is_sensitivity(plan.study) else []
     except InputError as error:

@@ -1,4 +1,4 @@
-"""One line per task: what the commands do, with files or with objects, and the result as an object."""
+"""One call per task: what the commands do, with files or with objects, and the result as an object."""
 
 from __future__ import annotations
 
@@ -45,27 +45,27 @@ def diagnose(
     out: str | Path | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Diagnosis:
-    """Find what a model is missing against measured records; ``hdsim diagnose`` in one line.
+    """Find which physical effect a model is missing; ``hdsim diagnose`` as a function.
 
     >>> hdsim.diagnose("log.csv", "base.yaml", mapping="mapping.yaml")
     >>> hdsim.diagnose(frame, scenario, mapping={"time": {"column": "t", "unit": "s"}, "channels": ...})
 
     Args:
         measured: one record or several: a file, a recording, or a pandas data frame.
-        scenario: the model, or its file; what it commands does not matter, its motion is the measured one.
-        mapping: of files and data frames, which column is which: a mapping's file or the same as a
+        scenario: the model, or its file; its command does not matter, as the measured motion is prescribed.
+        mapping: assigns the columns of files and data frames to channels: a mapping file or the same as a
             dictionary. A log of hdsim needs none.
         holdout: validation records, used in no fit; parts of ``measured`` when there are none.
-        load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
+        load: source of the load torque; ``load_torque`` when that is measured, else the scenario.
         zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
-        force: go on in spite of errors in the data.
-        black_box: learn the same samples by gradient boosting too (``hdsim[baseline]``).
-        out: folder for the report, the log and the scenario with what was found (``verdict.scenario``);
+        force: continue in spite of errors in the data.
+        black_box: also fit gradient-boosted trees as a baseline (``hdsim[baseline]``).
+        out: folder for the report, the log and the scenario with the result (``verdict.scenario``);
             needs the scenario's file.
-        on_step: told what is being done.
+        on_step: called with the name of each step.
 
     Returns:
-        The diagnosis; ``verdict`` is its summary. A notebook shows it as a page.
+        The diagnosis; ``verdict`` is its summary. A notebook displays it as a page.
 
     Raises:
         InputError: a file, a mapping or the scenario is wrong, or the data cannot answer the question.
@@ -101,7 +101,7 @@ def fit(
     out: str | Path | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
-    """Fit a scenario's numbers to measured records; ``hdsim fit`` in one line.
+    """Estimate a scenario's parameters from measured records; ``hdsim fit`` as a function.
 
     >>> found = hdsim.fit(recording, scenario, free=["drive.friction.coulomb_nm"])
     >>> better = scenario.with_(found.changes)
@@ -111,19 +111,19 @@ def fit(
         scenario: likewise.
         mapping: likewise.
         holdout: likewise.
-        free: paths of the only numbers that move; all that the model declares when empty. Numbers of a group
-            that are named together scale together.
-        fix: paths of numbers that do not move.
-        apart: paths of numbers of a group that move by themselves.
+        free: paths of the only free parameters; all that the model declares when empty. Parameters of a group
+            that are given together scale together.
+        fix: paths of parameters that stay fixed.
+        apart: paths of parameters of a group that are estimated by themselves.
         load: as for `diagnose`.
         zeros: likewise.
         force: likewise.
         black_box: likewise.
         out: folder for ``fit.json``, the page and ``fitted.yaml``; needs the scenario's file.
-        on_step: told what is being done.
+        on_step: called with the name of each step.
 
     Returns:
-        The numbers with intervals and correlations, and what the data cannot tell.
+        The estimates with confidence intervals and correlations, and what is not identifiable.
 
     Raises:
         InputError: as `diagnose`, or a path is none.
@@ -153,7 +153,7 @@ def study(
     on_progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> StudyResult:
-    """Make many runs of a scenario; ``hdsim study`` in one line.
+    """Make many runs of a scenario; ``hdsim study`` as a function.
 
     >>> hdsim.study("study.yaml", workers=2)
     >>> hdsim.study(scenario, {"load.inertia_kg_m2": [0.1, 0.3, 1.0]}, "positioning_error", replicates=5)
@@ -162,10 +162,10 @@ def study(
         base: a study's file; or, with ``metrics``, the scenario or its file.
         parameters: what varies, by the dotted name of a scenario's field: its values as a list, or as in a
             study's file (``{"type": "uniform", "low": 0.1, "high": 1.0}``).
-        metrics: what is taken of every run.
+        metrics: what is computed of every run.
         workers: processes on this machine.
-        out: folder of table, summary and pictures; a study that was stopped goes on there. Nothing is kept
-            when None.
+        out: folder of table, summary and figures; a study that was stopped continues there. Nothing is
+            kept when None.
         on_progress: called with the number of runs that are done and of all runs.
         options: other fields of a study: ``sampling``, ``replicates``, ``seed``, ``name``, ...
 
@@ -190,7 +190,7 @@ def study(
 def plant(
     scenario: AnyScenario, *, motor: MotorInput | None = None, output: OutputInput | None = None
 ) -> SteppedPlant:
-    """One joint that a loop of your own advances, step by step.
+    """One joint that your own control loop advances, step by step.
 
     >>> joint = hdsim.plant("scenarios/seed_move.yaml", motor="torque")
     >>> joint.step(1e-3, {"motor_torque": 0.1})
@@ -217,7 +217,7 @@ def plants(
     output: OutputInput | None = None,
     threads: int = 1,
 ) -> SteppedPlants:
-    """N joints that differ in numbers and seeds, advanced together: inputs and outputs have shape (N,).
+    """N joints that differ in parameters and seeds, advanced together: inputs and outputs have shape (N,).
 
     >>> loads = np.linspace(0.1, 1.0, 64)
     >>> drives = [scenario.with_({"load.inertia_kg_m2": load}) for load in loads]

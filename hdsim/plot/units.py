@@ -31,6 +31,12 @@ SECOND = Unit("s", 1.0)
 MINUTE = Unit("min", 1.0 / 60.0)
 
 
+def printed(unit: str) -> str:
+    """A unit with the signs of print: ``kg m^2`` is kg m²."""
+    unit = "µm" if unit == "um" else unit
+    return unit.replace("^2", "²").replace("^3", "³").replace("degC", "°C")
+
+
 def largest(*curves: Array) -> float:
     """Largest finite absolute value of all curves; 0 for none."""
     return max(

@@ -25,10 +25,10 @@ KINDS = {
 @click.command(short_help="Check scenarios, mappings, studies and load cycles; say what they describe.")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
 def check(files: tuple[str, ...]) -> None:
-    """Check files: one line for every mistake, or OK, what each describes, and what it hardly means.
+    """Check files: one line for every mistake, or OK, a summary and warnings.
 
-    What a file is shows in its keys: a mapping has channels, a study a base or metrics, a load cycle phases;
-    all others are scenarios.
+    The kind of a file follows from its keys: a mapping has channels, a study a base or metrics, a load cycle
+    phases; all others are scenarios.
     """
     problems: list[Problem] = []
     for file in files:

@@ -22,9 +22,13 @@ if TYPE_CHECKING:
 @click.option(
     "--load-torque-nm", type=float, help="Torque on the output [default: the scenario's at --time-s]."
 )
-@click.option("--motor-angle-rad", type=float, default=0.0, show_default=True, help="Where the motor stands.")
-@click.option("--motor-velocity-rad-per-s", type=float, default=0.0, show_default=True, help="Its speed.")
-@click.option("--time-s", type=float, default=0.0, show_default=True, help="When the load torque is read.")
+@click.option("--motor-angle-rad", type=float, default=0.0, show_default=True, help="Motor angle.")
+@click.option(
+    "--motor-velocity-rad-per-s", type=float, default=0.0, show_default=True, help="Motor velocity."
+)
+@click.option(
+    "--time-s", type=float, default=0.0, show_default=True, help="Time at which the load torque is read."
+)
 @click.option("--hold-motor", is_flag=True, help="Hold the motor; only the load torque is an input.")
 @click.option("--closed-loop", is_flag=True, help="With the scenario's controller.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Draw the Bode plot into this file.")

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help="Folder for the pictures [default: bench/NAME].",
+    help="Folder of the figures [default: bench/NAME].",
 )
-@click.option("--plot/--no-plot", default=True, show_default=True, help="Draw a picture of every procedure.")
+@click.option("--plot/--no-plot", default=True, show_default=True, help="Draw a figure of every procedure.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the rough flanks.")
 @click.option("--list", "listing", is_flag=True, is_eager=True, help="List the procedures and their metrics.")
 def bench(

@@ -57,12 +57,12 @@ def counter(title: str) -> Iterator[Callable[[int, int], object] | None]:
     "--resume/--fresh",
     default=True,
     show_default=True,
-    help="Go on where a stopped study was, or start again.",
+    help="Continue a stopped study, or start again.",
 )
 def study(file: Path, output: Path | None, workers: int, scheduler: str | None, resume: bool) -> int:
-    """Make every run of STUDY.yaml and write table, summary and pictures.
+    """Make every run of STUDY.yaml and write table, summary and figures.
 
-    A study that was stopped goes on where it was; its results are the same, and do not depend on the number
+    A study that was stopped continues where it was; its results are the same, and do not depend on the number
     of workers.
     """
     import time
@@ -162,7 +162,7 @@ def budget(
     """Split the positioning error of SCENARIO into its causes.
 
     Every combination of causes is run (of many causes: those that random orders go through). A cause's share
-    is Shapley's: shares and rest sum to the whole, however the causes work together.
+    is Shapley's: shares and rest sum to the whole, whatever their interaction.
     """
     import hdsim
     from hdsim.studies.engine.budget import error_budget

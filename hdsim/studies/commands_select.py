@@ -27,9 +27,9 @@ _HEADINGS = {
 @click.argument("loadcycle", metavar="LOADCYCLE")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the table.")
 def select(loadcycle: str, as_json: bool) -> int:
-    """Judge every gear on record by the torques and speeds of LOADCYCLE, by the makers' own procedure.
+    """Select gears for the torques and speeds of LOADCYCLE, by the makers' procedure.
 
-    Prints how much of each limit is left (allowed over asked: 1 is just enough), and why a size is refused.
+    Prints the margin of each limit (allowed over required: 1 is just enough), and why a size is refused.
     Exit status 1 when none carries it.
     """
     from hdsim.studies.selection import load_cycle

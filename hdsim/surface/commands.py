@@ -12,7 +12,7 @@ from hdsim.console import console
 @click.command(short_help="Find D and G of a measured flank.")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--spacing-um", type=click.FloatRange(min=0, min_open=True), help="Distance of points, um.")
-@click.option("--unit", help="Unit of the file's numbers: m, mm, um (default for text), nm.")
+@click.option("--unit", help="Unit of the file's values: m, mm, um (default for text), nm.")
 @click.option("--columns", is_flag=True, help="Profiles run down the columns of a map.")
 @click.option(
     "--min-lag-um", type=click.FloatRange(min=0, min_open=True), help="Shortest lag of the fit, um."

@@ -51,7 +51,7 @@ WORDINGS = {
         "share of the other effects' residual that it explains", _part
     ),
     "structure is left by chance": Wording(
-        "p-value: as much systematic residual from noise alone", below, "at most"
+        "probability of as much systematic residual from noise alone (p-value)", below, "at most"
     ),
     "part of what is left that is structure": Wording("systematic share of the residual", _part, "at least"),
     "what is left, in units of the noise": Wording(

@@ -172,9 +172,9 @@ def _over(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) -> 
             "--",
         )
     else:
-        _mean(axes, x, unit.factor * values["refit"], BEFORE, "residual after the re-fit")
+        _mean(axes, x, unit.factor * values["refit"], BEFORE, "residual of the re-fitted model")
     if after:
-        _mean(axes, x, unit.factor * values["after"], AFTER, "residual after")
+        _mean(axes, x, unit.factor * values["after"], AFTER, "residual of the final model")
     axes.set_ylim(*_limits(unit.factor * low, unit.factor * high))
     axes.set_xlabel(f"{label} ({name})" if name else label)
     axes.set_ylabel(f"residual ({unit.name})")
@@ -225,10 +225,20 @@ def _spectrum(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool)
         sizes[stage] = 2.0 * np.abs(waves @ (values - values.mean())) / len(part)
     unit = _unit(place.channel, float(sizes["refit"].max()))
     axes.plot(
-        orders, unit.factor * sizes["refit"], color=BEFORE, linewidth=1.1, label="residual after the re-fit"
+        orders,
+        unit.factor * sizes["refit"],
+        color=BEFORE,
+        linewidth=1.1,
+        label="residual of the re-fitted model",
     )
     if after:
-        axes.plot(orders, unit.factor * sizes["after"], color=AFTER, linewidth=1.1, label="residual after")
+        axes.plot(
+            orders,
+            unit.factor * sizes["after"],
+            color=AFTER,
+            linewidth=1.1,
+            label="residual of the final model",
+        )
     top = unit.factor * float(sizes["refit"].max())
     for at, text in _peaks(found, lines, highest, own[0].ratio):
         height = unit.factor * float(np.interp(at, orders, sizes["refit"]))
@@ -256,9 +266,13 @@ def _ringing(axes: Axes, found: Findings, place: PlaceEvidence, *, after: bool) 
         densities[stage] = np.sqrt(power[1:])
     frequency = frequency[1:]
     unit = _unit(place.channel, float(densities["refit"].max()))
-    axes.loglog(frequency, unit.factor * densities["refit"], color=BEFORE, label="residual after the re-fit")
+    axes.loglog(
+        frequency, unit.factor * densities["refit"], color=BEFORE, label="residual of the re-fitted model"
+    )
     if after:
-        axes.loglog(frequency, unit.factor * densities["after"], color=AFTER, label="residual after")
+        axes.loglog(
+            frequency, unit.factor * densities["after"], color=AFTER, label="residual of the final model"
+        )
     k = int(np.argmax(densities["refit"] * np.sqrt(frequency)))
     axes.annotate(f"{frequency[k]:.3g} Hz", (frequency[k], unit.factor * densities["refit"][k]), (0, 3),
                   textcoords="offset points", ha="center", fontsize=8.5, fontweight="bold")  # fmt: skip

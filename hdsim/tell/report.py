@@ -171,7 +171,7 @@ def _pointers(verdict: Verdict) -> str:
         noun = "problem" if len(serious) == 1 else "problems"
         said.append(f"<a href='#data'>{len(serious)} {noun} in the data</a>")
     if verdict.next_experiment is not None:
-        said.append("<a href='#next'>what to measure next</a>")
+        said.append("<a href='#next'>the next experiment</a>")
     if verdict.curve is not None:
         said.append("<a href='#curve'>the curve</a>")
     return f"<p>See also: {', '.join(said)}.</p>" if said else ""

@@ -13,7 +13,7 @@ from hdsim.diagnosis.screen import LEVEL
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import numbers_table, section, table
-from hdsim.tell.words import percent, short, shown, spoken, started, titles_of
+from hdsim.tell.words import percent, short, shown, spoken, started, title_of, titles_of
 
 
 def confusions(verdict: Verdict) -> str:
@@ -29,10 +29,11 @@ def confusions(verdict: Verdict) -> str:
             lines += f"<li><b>{html.escape(title)}</b>. How they differ: {html.escape(rule)}.</li>"
         body += f"<p>These data cannot distinguish <b>{html.escape(own)}</b> from:</p><ul>{lines}</ul>"
     if verdict.suspects:
-        listed = ", ".join(f"{spoken(name)} ({percent(share)})" for name, share in verdict.suspects.items())
+        listed = ", ".join(f"{title_of(name)} ({percent(share)})" for name, share in verdict.suspects.items())
         said = "Effects that explain a part of the residual, too little to be identified"
         body += f"<p>{said}: {html.escape(listed)}.</p>"
-    return section("Alternatives", body, "warn") if body else ""
+    title = "Alternatives" if any(one.indistinguishable_from for one in verdict.effects) else "Candidates"
+    return section(title, body, "warn") if body else ""
 
 
 def following(verdict: Verdict) -> str:
@@ -137,7 +138,7 @@ def not_tried(verdict: Verdict) -> str:
         return ""
     reasons: dict[str, list[str]] = {}
     for name, why in verdict.not_tried.items():
-        reasons.setdefault(why, []).append(spoken(name))
+        reasons.setdefault(why, []).append(title_of(name))
     rows = [[", ".join(names), why] for why, names in reasons.items()]
     return section("Effects not tested", table(("effects", "reason"), rows))
 

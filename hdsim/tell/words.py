@@ -15,11 +15,39 @@ from hdsim.scenario.fields import split_unit
 UNKNOWN = "not known"
 #: Odds beyond which they are only said to be large.
 LARGE_ODDS = 1000.0
+#: Words of names that are written with capital letters.
+_PROPER = {
+    "coulomb": "Coulomb",
+    "stribeck": "Stribeck",
+    "lugre": "LuGre",
+    "maxwell": "Maxwell",
+    "duhem": "Duhem",
+}
+_PROPER |= {"k1": "K1", "k2": "K2", "k3": "K3", "t1": "T1", "t2": "T2"}
+#: The field's terms for parameters of drive and load, by their path without the unit.
+_PARAMETERS = {
+    "drive.inertia.motor": "motor inertia",
+    "drive.inertia.wave_generator": "wave-generator inertia",
+    "drive.friction.coulomb": "Coulomb friction",
+    "drive.friction.viscous": "viscous friction",
+    "drive.friction.load_coefficient": "load coefficient of friction",
+    "drive.torsion.stiffness_k1": "torsional stiffness K1",
+    "drive.torsion.stiffness_k2": "torsional stiffness K2",
+    "drive.torsion.stiffness_k3": "torsional stiffness K3",
+    "drive.torsion.torque_t1": "knee torque T1",
+    "drive.torsion.torque_t2": "knee torque T2",
+    "drive.torsion.damping": "torsional damping",
+    "load.inertia": "load inertia",
+    "load.gravity.mass": "load mass",
+    "load.arm.payload.mass": "payload mass",
+    "load.arm.payload.lever": "payload lever",
+    "load.arm.mass_factor": "mass factor of the arm",
+}
 
 
 def spoken(name: str) -> str:
     """A name of the program as words."""
-    return name.replace("_", " ")
+    return " ".join(_PROPER.get(word, word) for word in name.replace("_", " ").split(" "))
 
 
 def started(sentence: str) -> str:
@@ -89,7 +117,7 @@ def odds(weight: float) -> str:
 
 
 def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[str, str]:
-    """Name and unit of a parameter by its path: ``drive.friction.coulomb_nm`` is friction, coulomb in N m.
+    """Name and unit of a parameter by its path: ``drive.friction.coulomb_nm`` is Coulomb friction in N m.
 
     Args:
         path: dotted path.
@@ -97,6 +125,9 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
     """
     parts = path.split(".")
     last, unit = split_unit(parts[-1])
+    term = _PARAMETERS.get(".".join([*parts[:-1], last.replace(" ", "_")]))
+    if term is not None:
+        return term, units.printed(unit)
     sections: list[str] = []
     here: Any = settings
     for part in parts[:-1]:
@@ -110,13 +141,7 @@ def named_number(path: str, settings: Mapping[str, Any] | None = None) -> tuple[
             sections[-1:] = [f"order {here['order']:g}{turn}"]
         elif part != "drive":
             sections.append(f"no. {int(part) + 1}" if part.isdigit() else spoken(part))
-    return ", ".join([*sections, last]), written(unit)
-
-
-def written(unit: str) -> str:
-    """A unit with the signs of print: ``kg m^2`` is kg m²."""
-    unit = "µm" if unit == "um" else unit
-    return unit.replace("^2", "²").replace("^3", "³").replace("degC", "°C")
+    return ", ".join([*sections, spoken(last)]), units.printed(unit)
 
 
 def unit_of(gap: Gap) -> units.Unit:

@@ -19,11 +19,11 @@ import click
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the table.")
 @click.option("--markdown", is_flag=True, help="Print the table as Markdown.")
 def validate(only: tuple[str, ...], listed: bool, data: Path | None, as_json: bool, markdown: bool) -> int:
-    """Compute one table of what hdsim gives beside what others print, measured or computed.
+    """Compare hdsim with what others have printed, measured or computed, in one table.
 
     Every row is computed when the command runs, with its source, its tolerance and where that comes from.
-    Rows marked as having set a number of the model only show that it gives them back. A row that fails is
-    shown as failing; exit status 1 when there is one.
+    Rows marked as having calibrated a parameter of the model only show that it reproduces them. A row that
+    fails is shown as failing; exit status 1 when there is one.
     """
     from hdsim.console import console
     from hdsim.validate.report import print_rows, to_json, to_markdown

@@ -116,7 +116,7 @@ def test_a_mapping_that_does_not_fit_names_its_place(ask, mapping, words):
         (180 / np.pi, ["unit", "in degrees"]),
         (1 / (2 * np.pi), ["unit", "in revolutions"]),
         (10800 / np.pi, ["unit", "in arcmin"]),
-        (-1.0, ["sign", "its sign turned"]),
+        (-1.0, ["sign", "its sign reversed"]),
         (-100.0, ["side", "the other side of the gear:"]),
         (2.0, ["ratio", "another drive", "motor over output angle is -", "the model's ratio -100"]),
     ],

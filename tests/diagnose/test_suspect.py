@@ -57,13 +57,13 @@ def test_this_drive_with_other_numbers_or_an_effect_is_not_suspected(tmp_path, r
     ("record", "kind", "words"),
     [
         (scaled(torque=1000.0), "unit", ["1000 times", "mN m for N m"]),
-        (scaled(torque=1e-3), "unit", ["0.001 times", "off by 1000"]),
-        (scaled(torque=-1.0), "sign", ["-1 times", "sign turned"]),
+        (scaled(torque=1e-3), "unit", ["0.001 times", "wrong by 1000"]),
+        (scaled(torque=-1.0), "sign", ["-1 times", "sign reversed"]),
         (scaled(torque=-100.0), "side", ["-100 times", "other side of the gear"]),
         (scaled(torque=-0.01), "side", ["-0.01 times", "other side of the gear"]),
         (scaled(torque=180 / np.pi), "unit", ["57.3 times", "degrees"]),
         (scaled(motor=1 / (2 * np.pi)), "unit", ["6.3 times", "acceleration", "revolutions"]),
-        (scaled(motor=-1.0), "sign", ["-1 times", "sign turned"]),
+        (scaled(motor=-1.0), "sign", ["-1 times", "sign reversed"]),
         (scaled(inertia=12 * TOTAL), "ratio", ["times", "of another drive"]),
     ],
 )

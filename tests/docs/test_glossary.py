@@ -32,7 +32,7 @@ HOME_MADE = {
     r"tied to": "confounded with",
     r"shakes up": "excites",
     r"the model lacks": "is missing from the model",
-    r"farthest off|how far off": "deviation, residual",
+    r"farthest off|how far off the model": "deviation, residual",
     r"anybody's|somebody else's": "any",
 }
 

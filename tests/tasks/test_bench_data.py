@@ -357,7 +357,8 @@ def test_what_is_open_is_asked_on_a_terminal_and_listed_elsewhere(
     answers, asked = ["up", "output_angle"], []
     monkeypatch.setattr("click.prompt", lambda words, **options: asked.append(words) or answers.pop(0))
     assert command("mapping", "a.csv", "--force") == 0
-    asks = "whether position_deg is output_angle or motor_angle; such as output_angle, or - to leave it open"
+    asks = "The channel of position_deg: output_angle or motor_angle"
+    asks += " (for example output_angle; - leaves it open)"
     assert asked == 2 * [asks]
     assert "found 'up', expected motor_angle" in capsys.readouterr().err
     assert command("check", "mapping.yaml") == 0

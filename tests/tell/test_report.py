@@ -185,10 +185,10 @@ def test_moved_and_undetermined_numbers_say_so(found, tmp_path):
         found, tmp_path, verdict="parameter", effects=[], parameters=numbers,
         moved=["drive.friction.coulomb_nm"], data_problems=[problem], not_tried={"unbalance": "no <gravity>"},
     )  # fmt: skip
-    assert "one parameter of the model is wrong: friction, coulomb 0.045 instead of 0.03 N m" in text
-    assert "<tr class='moved'><td>friction, coulomb" in text
+    assert "one parameter of the model is wrong: Coulomb friction 0.045 instead of 0.03 N m" in text
+    assert "<tr class='moved'><td>Coulomb friction" in text
     assert "+50.0 %" in text
-    assert "not identifiable from these data: confounded with load, inertia" in text
+    assert "not identifiable from these data: confounded with load inertia" in text
     assert "3 &lt;spikes&gt;" in text
     assert "1 problem in the data" in text
     assert "no &lt;gravity&gt;" in text

@@ -16,10 +16,10 @@ from hdsim.tell.fit_report import save_fit
 GLOSSARY = Path(__file__).parents[2] / "docs" / "glossary.md"
 #: Labels that need no explanation.
 PLAIN = {
-    "after", "after/before", "against · for", "before", "change", "channel", "combination", "content", "criterion", "effects",
-    "effects not tested", "file", "files", "finding", "kind", "measured", "met", "method", "model", "model after",
-    "model before", "observed", "problems in the data", "re-fit", "reason", "severity", "the data", "time",
-    "unit", "value", "what it means", "why this verdict",
+    "after", "after/before", "against · for", "before", "change", "channel", "combination", "content",
+    "criterion", "effects", "effects not tested", "file", "files", "finding", "kind", "measured", "met",
+    "method", "model", "model after", "model before", "observed", "problems in the data", "re-fit",
+    "reason", "severity", "the data", "time", "unit", "value", "what it means", "why this verdict",
 }  # fmt: skip
 
 

@@ -145,7 +145,7 @@ def test_numbers_are_shown_without_needless_exponents(value, text):
 
 
 def test_paths_become_words_and_units():
-    assert named_number("drive.torsion.damping_nm_s_per_rad") == ("torsion, damping", "N m s/rad")
+    assert named_number("drive.torsion.damping_nm_s_per_rad") == ("torsional damping", "N m s/rad")
     components = {"components": [{"order": 2, "per": "output_turn"}]}
     assert named_number("components.0.amplitude_arcmin", components) == (
         "order 2 per output turn, amplitude",

@@ -252,4 +252,4 @@ def _gaps(time: np.ndarray, found: Draft) -> None:
 def _leave_out(found: Draft) -> None:
     """A channel whose side or unit is open stands as a comment; without any, there is no mapping."""
     if not found.channels:
-        found.ask("which column is what, for no name says it", "COLUMN.channel", "output_angle")
+        found.ask("the channel of each column, as no name tells it", "COLUMN.channel", "output_angle")

@@ -93,7 +93,8 @@ def _judged(
     possible = ", ".join(value for cost, value in rivals if cost <= POSSIBLE)
     if rivals[0][0] > usual:
         return Answer(best, Ground.ASSUMED, f"{assumed}; the numbers would allow {possible}")
-    return Answer(None, Ground.OPEN, f"{best} or {possible}")
+    *others, last = [str(best), *(value for cost, value in rivals if cost <= POSSIBLE)]
+    return Answer(None, Ground.OPEN, f"{', '.join(others)} or {last}")
 
 
 def _ratio(motion: Motion, said: float | None, columns: list[Candidate], draft: Draft) -> float | None:
@@ -101,7 +102,7 @@ def _ratio(motion: Motion, said: float | None, columns: list[Candidate], draft: 
         sign = math.copysign(1.0, motion.ratio) if motion.ratio else math.copysign(1.0, said)
         if motion.ratio and sign != math.copysign(1.0, said):
             draft.ask(
-                f"the sign of the ratio: you say {said:g}, the angles turn the other way",
+                f"the sign of the ratio: you gave {said:g}, the angles turn the other way",
                 "ratio",
                 f"{-said:g}",
             )
@@ -168,7 +169,7 @@ def _add(k: int, columns: list[Candidate], motion: Motion, turn: float | None, d
     draft.channels[name] = channel
     if ground == Ground.OPEN:
         draft.ask(
-            f"whether {column.label} is output_{column.quantity} or motor_{column.quantity}",
+            f"the channel of {column.label}: output_{column.quantity} or motor_{column.quantity}",
             f"{column.label}.channel",
             f"output_{column.quantity}",
         )

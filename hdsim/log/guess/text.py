@@ -23,7 +23,7 @@ def to_text(draft: Draft, form: Form | None = None) -> str:
         f"# Mapping of {draft.title}, drafted by hdsim mapping.",
         *_wrapped("; ".join(draft.notes) + "."),
     ]
-    lines += ["# Behind each key stands why; what is assumed wants a look, what is OPEN an answer."]
+    lines += ["# Each key has its reason beside it. Please check what is assumed, and answer what is OPEN."]
     if form is not None:
         given = form.model_dump(include={"format", "separator", "decimal", "encoding", "skip_lines"},
                                 exclude_defaults=True)  # fmt: skip

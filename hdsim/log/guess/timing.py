@@ -43,7 +43,7 @@ def find_time(
     column = _column(survey.columns, said.get("column"))
     if column is None:
         draft.time["rate_hz"] = Answer(None, Ground.OPEN, "no column counts time")
-        draft.ask("the sample rate in Hz, for no column counts time", "time.rate_hz", "1000")
+        draft.ask("the sample rate in Hz, as no column is a time", "time.rate_hz", "1000")
         return np.arange(count, dtype=float), {"s": (1.0, 0.0)}
     named = column.meaning.quantity == "time"
     draft.time["column"] = Answer(

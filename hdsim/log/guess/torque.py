@@ -45,7 +45,7 @@ def map_torques(columns: list[Candidate], ratio: float | None, draft: Draft) -> 
             )
             draft.channels["output_torque"] = channel
             draft.ask(
-                f"whether {column.label} is motor_torque, output_torque (of the drive) or load_torque",
+                f"the channel of {column.label}: motor_torque, output_torque (of the drive) or load_torque",
                 f"{column.label}.channel",
                 "motor_torque",
             )
@@ -185,7 +185,7 @@ def _direction(motor: Channel, ratio: float | None, draft: Draft) -> None:
         output.keys["sign"] = Answer(None, Ground.OPEN, why)
         draft.ask(
             f"the sign of {output.source.label}: {why}, and the drive's torque on the output does not "
-            f"(or say the other's)",
+            f"(or give the other's)",
             f"{output.source.label}.sign",
             "-1",
         )

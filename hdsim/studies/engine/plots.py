@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.plot import style
+from hdsim.plot import style, units
 from hdsim.studies.engine.reading import described
 from hdsim.studies.engine.sensitivity import Sensitivity, is_sensitivity
 from hdsim.studies.engine.summary import MetricSummary
@@ -89,7 +89,7 @@ def page(
 
 def label(name: str, unit: str) -> str:
     """Axis label of a parameter or metric."""
-    return name if unit in ("", "1") else f"{name} ({unit})"
+    return name if unit in ("", "1") else f"{name} ({units.printed(unit)})"
 
 
 def named(metric: Metric) -> str:
@@ -137,7 +137,7 @@ def curves(
     about = "mean of the runs at each value"
     if several:
         about = (
-            f"line: mean with its {plan.study.confidence:.0%} confidence interval; band: 5 % to 95 % "
+            f"line: mean with its {100 * plan.study.confidence:g} % confidence interval; band: 5 % to 95 % "
             f"quantile of {max(s.runs for s in summaries)} runs at each value"
         )
     with page(_title(plan, metric), f"{metric.description}. {about[0].upper()}{about[1:]}.") as (

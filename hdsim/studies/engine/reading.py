@@ -241,6 +241,8 @@ def described(path: str) -> str:
     *before, last = parse(path)
     while before and before[-1] in _SECTIONS:
         before.pop()
+    if not before and parse(path)[0] == "load":
+        before = ["load"]  # the load's inertia is none of the drive's
     # An entry of a list needs the list's name and its owner's.
     owner = before[-1:] if before and isinstance(before[-1], str) else before[-3:]
     return " ".join(str(part) for part in [*owner, split_unit(str(last))[0]]).replace("_", " ")
