@@ -11,6 +11,9 @@ from hdsim._compile import compiled
 
 _inline: Any = compiled
 
+#: Corners of a spring, each as its twist and by how much the spring is stiffer beyond it, before its table.
+CORNERS = 3
+
 
 @_inline
 def hermite(p, at, step, cells, x):  # type: ignore[no-untyped-def]
@@ -39,11 +42,25 @@ def hermite(p, at, step, cells, x):  # type: ignore[no-untyped-def]
 
 
 @_inline
+def cornered(p, at, step, cells, x):  # type: ignore[no-untyped-def]
+    """Energy, force and stiffness of a spring at x >= 0: its corners, then the rest of it as a table."""
+    energy, force, stiffness = hermite(p, at + 2 * CORNERS, step, cells, x)
+    for k in range(CORNERS):
+        past = x - p[at + 2 * k]
+        if past > 0.0:
+            stiffer = p[at + 2 * k + 1]
+            energy += 0.5 * stiffer * past * past
+            force += stiffer * past
+            stiffness += stiffer
+    return energy, force, stiffness
+
+
+@_inline
 def spring(p, at, step, cells, twist, half_gap):  # type: ignore[no-untyped-def]
     """Energy, torque and stiffness of an odd spring over twist, behind a dead-zone."""
     if twist >= half_gap:
-        return hermite(p, at, step, cells, twist - half_gap)
+        return cornered(p, at, step, cells, twist - half_gap)
     if twist < -half_gap:
-        energy, force, stiffness = hermite(p, at, step, cells, -twist - half_gap)
+        energy, force, stiffness = cornered(p, at, step, cells, -twist - half_gap)
         return energy, -force, stiffness
     return 0.0, 0.0, 0.0

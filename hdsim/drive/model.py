@@ -133,15 +133,15 @@ class Model(Contributed):
             return None, np.zeros(0)
         if isinstance(mesh, LumpedMesh):
             reach = spring.TABLE_REACH * self.rated_torque_nm
-            step, cells = spring.catalogue_cells(self.drive.torsion, tuple(self._given.wind_ups), reach)
+            step, numbers = spring.catalogue_numbers(self.drive.torsion, tuple(self._given.wind_ups), reach)
             parameters = np.zeros(_mesh_layout.HEADER)
             parameters[_mesh_layout.INVERSE_RATIO] = 1 / self.ratio
             # A lumped mesh has no teeth to press together: a preload only takes up play.
             parameters[_mesh_layout.EXTRA_GAP] = max(self._given.half_gap_rad, 0.0)
             parameters[_mesh_layout.SPRING_STEP] = step
-            parameters[_mesh_layout.SPRING_CELLS] = len(cells)
+            parameters[_mesh_layout.SPRING_CELLS] = spring.CELLS
             parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER
-            return _mesh.lumped_mesh, np.concatenate([parameters, cells.ravel()])
+            return _mesh.lumped_mesh, np.concatenate([parameters, numbers])
         self.teeth = kept_teeth.teeth_of(
             self.drive,
             mesh,

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 #: Torque up to which the torsion table reaches, as a multiple of the rated torque; linear beyond.
 TABLE_REACH = 4.0
 CELLS = 2048
+#: Torque to both sides of a corner within which its slopes are taken, as a share of the table's reach.
+_BESIDE = 1e-6
 
 
 def catalogue_wind_up(torsion: Torsion, torque: Array) -> Array:
@@ -49,17 +51,17 @@ def catalogue_wind_up(torsion: Torsion, torque: Array) -> Array:
 
 
 @lru_cache(maxsize=32)
-def catalogue_cells(
+def catalogue_numbers(
     torsion: Torsion, beside: tuple[Callable[[Array], Array], ...], largest_torque_nm: float
 ) -> tuple[float, Array]:
-    """Torque over twist of the catalogue's wind-up and others beside it, see ``spring_cells``; read-only.
+    """Torque over twist of the catalogue's wind-up and others beside it, see ``spring_numbers``; read-only.
 
     Kept for the next model: a fit makes hundreds that differ in other numbers.
     """
     corners = [torsion.torque_t1_nm, torsion.torque_t2_nm]
-    step, cells = spring_cells([partial(catalogue_wind_up, torsion), *beside], corners, largest_torque_nm)
-    cells.setflags(write=False)
-    return step, cells
+    step, numbers = spring_numbers([partial(catalogue_wind_up, torsion), *beside], corners, largest_torque_nm)
+    numbers.setflags(write=False)
+    return step, numbers
 
 
 def structure_wind_up(
@@ -100,28 +102,42 @@ def structure_wind_up(
     return wind_up
 
 
-def spring_cells(
+def spring_numbers(
     wind_ups: Sequence[Callable[[Array], Array]],
     corners_nm: Sequence[float],
     largest_torque_nm: float,
     *,
     scale: float = 1.0,
 ) -> tuple[float, Array]:
-    """Torque over twist of springs in series, as quartic-energy cells for the compiled mesh.
+    """Torque over twist of springs in series, for the compiled mesh: corners, and the rest as a table.
+
+    With s_k by how much the spring is stiffer beyond its corner at the twist x_k,
+
+        T(x) = R(x) + sum_k s_k max(x - x_k, 0),
+
+    R has no corner and is what the table holds (three straight segments: exactly). A corner within a cell of
+    a table would be rounded over it, otherwise at every place, and so would what moves it: of dT/dK1, which
+    is x before the first corner and K2 T1 / K1^2 beyond, a table of T is off by 40 % within that cell.
 
     Args:
         wind_ups: odd, increasing functions from torque (N m) to twist (rad), both at the output.
-        corners_nm: torques where a wind-up has a corner.
+        corners_nm: torques where a wind-up has a corner, up to ``_quartic.CORNERS``.
         largest_torque_nm: end of the table.
         scale: |g| of the arrangement: twist at the ring is scale times, torque 1/scale times the output's.
 
     Returns:
-        Cell width (rad) and coefficients of shape (CELLS, 5), see ``hdsim.contact.kernel_table``.
+        Cell width (rad), and numbers of shape (2 CORNERS + 5 CELLS,): twist (rad) and rise of the stiffness
+        (N m/rad) of each corner, and cells, see ``hdsim.contact.kernel_table``.
 
     Raises:
         PhysicsError: the total wind-up does not increase with torque.
     """
     from scipy.interpolate import PchipInterpolator
+
+    from hdsim.drive._quartic import CORNERS
+
+    def total(torque: Array) -> Array:
+        return scale * np.sum([wind_up(torque) for wind_up in wind_ups], axis=0)
 
     # Denser towards zero, where a play is taken up.
     near = np.geomspace(1e-6, 1e-1, 400) * largest_torque_nm
@@ -129,12 +145,23 @@ def spring_cells(
     torque = np.unique(np.concatenate([even, near, np.asarray(corners_nm)]))
     apart = np.diff(torque, prepend=-1.0) > 1e-10 * largest_torque_nm
     torque = torque[apart & (torque <= largest_torque_nm)]
-    twist = scale * np.sum([wind_up(torque) for wind_up in wind_ups], axis=0)
+    twist = total(torque)
     if np.any(np.diff(twist) <= 0):
         bad = torque[int(np.argmax(np.diff(twist) <= 0))]
         raise PhysicsError(f"the torsion chain's twist must grow with torque; it does not at {bad:.4g} N m")
-    curve = PchipInterpolator(twist, torque / scale)
-    step = float(twist[-1]) / CELLS
-    nodes = step * np.arange(CELLS + 1)
+    corners = np.zeros((CORNERS, 2))
+    step = _BESIDE * largest_torque_nm
+    inner = np.unique([corner for corner in corners_nm if step < corner < largest_torque_nm - step])
+    here = total(inner)
+    corners[: len(inner), 0] = here
+    corners[: len(inner), 1] = step / scale / (total(inner + step) - here)
+    corners[: len(inner), 1] -= step / scale / (here - total(inner - step))
+    straightened = torque / scale
+    for at, stiffer in corners:
+        straightened = straightened - stiffer * np.maximum(twist - at, 0.0)
+    curve = PchipInterpolator(twist, straightened)
+    width = float(twist[-1]) / CELLS
+    nodes = width * np.arange(CELLS + 1)
     nodes[-1] = twist[-1]
-    return step, quartic_cells(step, curve(nodes), curve.derivative()(nodes))[0]
+    cells, _ = quartic_cells(width, curve(nodes), curve.derivative()(nodes))
+    return width, np.concatenate([corners.ravel(), cells.ravel()])

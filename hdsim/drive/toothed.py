@@ -284,7 +284,7 @@ class Teeth:
         rated = self.drive.rated_torque_nm
 
         self.structure_wind_up = spring.structure_wind_up(torsion, rated, self.wind_up)
-        step, cells = spring.spring_cells(
+        step, numbers = spring.spring_numbers(
             [self.structure_wind_up, *wind_ups],
             [torsion.torque_t1_nm, torsion.torque_t2_nm, rated],
             spring.TABLE_REACH * rated,
@@ -292,8 +292,8 @@ class Teeth:
         )
         header = self._header
         header[place.SPRING_STEP] = step
-        header[place.SPRING_CELLS] = len(cells)
-        header[place.SPRING_AT] = self._place(cells)
+        header[place.SPRING_CELLS] = spring.CELLS
+        header[place.SPRING_AT] = self._place(numbers)
 
     def _place_table(self, mesh: TabulatedMesh, teeth: Array) -> None:
         """The teeth's potential as a table, and its measured error."""

@@ -28,14 +28,15 @@ def step_each(  # type: ignore[no-untyped-def]
     t_eval, out = np.zeros(0), np.zeros((0, y.shape[1]))
     others, near = np.zeros((0, reals.shape[1])), np.zeros((0, y.shape[1]))
     lists, shared = np.zeros((0, len(integers)), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
-    slopes, beside = np.zeros((0, y.shape[1])), np.zeros((0, 0, y.shape[1]))
+    slopes, sizes = np.zeros((0, y.shape[1])), np.zeros((0, y.shape[1]))
+    beside = np.zeros((0, 0, y.shape[1]))
     for k in drives:
         cuts[0], cuts[1] = control[k, T], control[k, T_BOUND]
         progress[:] = 0
         statuses[k] = cover(
             address, integers, reals[k], scratch, stops, y[k], atol[k], control[k], counts, work, times,
             states, pieces, cuts, inside_at, guarded, limit, t_eval, out, progress, 1 << 40, others, lists,
-            shared, near, slopes, beside,
+            shared, near, slopes, sizes, beside,
         )  # fmt: skip
 
 

@@ -10,6 +10,13 @@ S. P. Norsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., 
 Over each step of the model it is solved by Radau IIA of two stages, order 3 and L-stable (Hairer and Wanner
 1996, IV.5), with one linear system for all the models beside it; between the ends of a step d_k is the cubic
 that has values and slopes there.
+
+Where the right-hand side has a corner (a spring's stiffness jumps, a tooth touches) f itself is continuous.
+With the corner passed at the time t*, the difference behind it is the one before it plus (f_before -
+f_behind) dt* (the saltation matrix: M. di Bernardo et al., *Piecewise-smooth Dynamical Systems*, Springer
+2008, section 2.5), and so it does not jump, wherever the numbers of the model move the corner: only J and the
+push f(r_k) - f(r) do. What is lost within the step that passes a corner is its size times the jump of J: such
+a step is halved until little is lost.
 """
 
 from __future__ import annotations
@@ -27,6 +34,11 @@ _jit: Any = compiled
 #: Radau IIA: first node; the other is the end of the step. Coefficients of its two stages.
 _NODE = 1.0 / 3.0
 _A11, _A12, _A21, _A22 = 5.0 / 12.0, -1.0 / 12.0, 0.75, 0.25
+#: A step with a corner of J is halved, down to so small a part, where the corner changes a difference by more
+#: than this share of its size so far.
+_SMALLEST_PART, _COUNTS = 1.0 / 16.0, 1e-2
+#: J counts as smooth over a step where it bends by less than this part of its change: a corner by a third.
+_SMOOTH = 0.2
 
 
 @_jit
@@ -45,6 +57,41 @@ def _pushes(address, t, y, own, lists, others, shared, scratch, kept, other, spa
 
 
 @_jit
+def _inside(states, pieces, step, s, y):  # type: ignore[no-untyped-def]
+    """The model's state at the part ``s`` of a step, shape (n,), into ``y``."""
+    r = 1.0 - s
+    for i in range(len(y)):
+        y[i] = states[step, i] * r + s * (
+            states[step + 1, i] + r * (pieces[step, 0, i] + s * pieces[step, 1, i])
+        )
+
+
+@_jit
+def _cornered(h, start, mid, end, near, sizes, bend):  # type: ignore[no-untyped-def]
+    """Whether J has a corner within the step, and what that does to a difference d counts.
+
+    With a jump of J, J at the first node is off the straight line between the ends by at least a third of the
+    jump; where J is smooth, by a small part of its change. Work: ``bend`` (n, n) or larger.
+    """
+    n, found = near.shape[1], False
+    for i in range(n):
+        bent = False
+        for j in range(n):
+            change = end[i, j] - start[i, j]
+            bend[i, j] = h * (mid[i, j] - start[i, j] - _NODE * change)
+            if abs(bend[i, j]) <= _SMOOTH * h * abs(change):
+                bend[i, j] = 0.0
+            bent = bent or bend[i, j] != 0.0
+        if bent and not found:
+            for b in range(near.shape[0]):
+                off = 0.0
+                for j in range(n):
+                    off += bend[i, j] * near[b, j]
+                found = found or abs(off) > _COUNTS * sizes[b, i]
+    return found
+
+
+@_jit
 def follow(  # type: ignore[no-untyped-def]
     address,
     integers,
@@ -60,6 +107,7 @@ def follow(  # type: ignore[no-untyped-def]
     fresh,
     near,
     slopes,
+    sizes,
     t_eval,
     out,
 ):
@@ -81,72 +129,86 @@ def follow(  # type: ignore[no-untyped-def]
         fresh: whether something jumped where the first step begins, so that the slopes are to be made anew.
         near: differences of the states, shape (k, n); updated.
         slopes: their time derivatives, shape (k, n); updated.
+        sizes: the largest differences so far, shape (k, n); updated.
         t_eval: increasing times up to the end of the last step, shape (m,).
         out: gets the differences there, shape (k, m, n).
     """
     n, k = states.shape[1], others.shape[0]
     f, other, dfdt = np.empty(n), np.empty(n), np.empty(n)
     between, mid, end = np.empty(n), np.empty(n), np.empty(n)
-    at_mid, at_end = np.empty((n, n)), np.empty((n, n))
+    at_start, at_mid, at_end = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     push_mid, push_end = np.empty((k, n)), np.empty((k, n))
     matrix, inverse = np.empty((2 * n, 2 * n)), np.empty(2 * n)
     pivots, both = np.empty(2 * n, dtype=np.int64), np.empty(2 * n)
     kept = np.empty(max(0, np.max(shared[:, 2])))
+    call_system(address, times[0], states[0], integers, reals, scratch, 1, f, at_start, dfdt)
     if fresh:
-        call_system(address, times[0], states[0], integers, reals, scratch, 1, f, at_end, dfdt)
         _pushes(
             address, times[0], states[0], f, lists, others, shared, scratch, kept, other, at_mid, dfdt, slopes
         )
         for b in range(k):
             for i in range(n):
                 for j in range(n):
-                    slopes[b, i] += at_end[i, j] * near[b, j]
+                    slopes[b, i] += at_start[i, j] * near[b, j]
     sample = 0
     for step in range(count):
-        t0, t1 = times[step], times[step + 1]
-        h = t1 - t0
-        t_mid = t0 + _NODE * h
-        rest = 1.0 - _NODE
-        for i in range(n):
-            between[i] = states[step, i] * rest + _NODE * (
-                states[step + 1, i] + rest * (pieces[step, 0, i] + _NODE * pieces[step, 1, i])
+        length = times[step + 1] - times[step]
+        done, part = 0.0, 1.0
+        while done < 1.0:
+            arrives = done + part == 1.0
+            t0 = times[step] + done * length
+            t1 = times[step + 1] if arrives else times[step] + (done + part) * length
+            h = part * length
+            t_mid = t0 + _NODE * h
+            _inside(states, pieces, step, done + _NODE * part, between)
+            call_system(address, t_mid, between, integers, reals, scratch, 1, mid, at_mid, dfdt)
+            _pushes(
+                address, t_mid, between, mid, lists, others, shared, scratch, kept, other, matrix, dfdt,
+                push_mid,
+            )  # fmt: skip
+            _inside(states, pieces, step, done + part, between)
+            call_system(address, t1, between, integers, reals, scratch, 1, end, at_end, dfdt)
+            if part > _SMALLEST_PART and _cornered(h, at_start, at_mid, at_end, near, sizes, matrix):
+                part *= 0.5
+                continue
+            _pushes(
+                address, t1, between, end, lists, others, shared, scratch, kept, other, matrix, dfdt, push_end
             )
-        call_system(address, t_mid, between, integers, reals, scratch, 1, mid, at_mid, dfdt)
-        _pushes(
-            address, t_mid, between, mid, lists, others, shared, scratch, kept, other, matrix, dfdt, push_mid
-        )
-        at = states[step + 1]
-        call_system(address, t1, at, integers, reals, scratch, 1, end, at_end, dfdt)
-        _pushes(address, t1, at, end, lists, others, shared, scratch, kept, other, matrix, dfdt, push_end)
-        for i in range(n):
-            for j in range(n):
-                same = 1.0 if i == j else 0.0
-                matrix[i, j] = same - h * _A11 * at_mid[i, j]
-                matrix[i, n + j] = -h * _A12 * at_end[i, j]
-                matrix[n + i, j] = -h * _A21 * at_mid[i, j]
-                matrix[n + i, n + j] = same - h * _A22 * at_end[i, j]
-        factorise(matrix, inverse, pivots, 2 * n)
-        last = sample
-        while last < len(t_eval) and t_eval[last] <= t1:
-            last += 1
-        for b in range(k):
             for i in range(n):
-                both[i] = near[b, i] + h * (_A11 * push_mid[b, i] + _A12 * push_end[b, i])
-                both[n + i] = near[b, i] + h * (_A21 * push_mid[b, i] + _A22 * push_end[b, i])
-            solve(matrix, inverse, pivots, 2 * n, at_mid, 2 * n, 0.0, both)
-            for i in range(n):
-                slope = push_end[b, i]
                 for j in range(n):
-                    slope += at_end[i, j] * both[n + j]
-                before, after = near[b, i], both[n + i]
-                first, second = h * slopes[b, i], h * slope
-                for m in range(sample, last):
-                    s = (t_eval[m] - t0) / h
-                    r = 1.0 - s
-                    out[b, m, i] = (
-                        before * r * r * (1.0 + 2.0 * s)
-                        + after * s * s * (1.0 + 2.0 * r)
-                        + r * s * (r * first - s * second)
-                    )
-                near[b, i], slopes[b, i] = after, slope
-        sample = last
+                    same = 1.0 if i == j else 0.0
+                    matrix[i, j] = same - h * _A11 * at_mid[i, j]
+                    matrix[i, n + j] = -h * _A12 * at_end[i, j]
+                    matrix[n + i, j] = -h * _A21 * at_mid[i, j]
+                    matrix[n + i, n + j] = same - h * _A22 * at_end[i, j]
+            factorise(matrix, inverse, pivots, 2 * n)
+            last = sample
+            while last < len(t_eval) and t_eval[last] <= t1:
+                last += 1
+            for b in range(k):
+                for i in range(n):
+                    both[i] = near[b, i] + h * (_A11 * push_mid[b, i] + _A12 * push_end[b, i])
+                    both[n + i] = near[b, i] + h * (_A21 * push_mid[b, i] + _A22 * push_end[b, i])
+                solve(matrix, inverse, pivots, 2 * n, at_mid, 2 * n, 0.0, both)
+                for i in range(n):
+                    slope = push_end[b, i]
+                    for j in range(n):
+                        slope += at_end[i, j] * both[n + j]
+                    before, after = near[b, i], both[n + i]
+                    first, second = h * slopes[b, i], h * slope
+                    for m in range(sample, last):
+                        s = (t_eval[m] - t0) / h
+                        r = 1.0 - s
+                        out[b, m, i] = (
+                            before * r * r * (1.0 + 2.0 * s)
+                            + after * s * s * (1.0 + 2.0 * r)
+                            + r * s * (r * first - s * second)
+                        )
+                    near[b, i], slopes[b, i] = after, slope
+                    sizes[b, i] = max(sizes[b, i], abs(after))
+            sample = last
+            at_start, at_end = at_end, at_start
+            done += part
+            # Longer again where that ends at one of the halves of halves.
+            if done < 1.0 and done % (2.0 * part) == 0.0:
+                part *= 2.0

@@ -56,6 +56,7 @@ def cover(  # type: ignore[no-untyped-def]
     shared,
     near,
     slopes,
+    sizes,
     beside,
 ):
     """Integrate through the spans between ``cuts``; sample at increasing ``t_eval`` (m,) into ``out`` (m, n).
@@ -66,7 +67,7 @@ def cover(  # type: ignore[no-untyped-def]
     state ``guarded`` (-1: none) may not grow beyond ``limit``. ``progress`` (2,) counts spans and samples and
     starts with zeros. After so many ``blocks`` of steps control goes back to Python, which hears of Ctrl-C.
     Of models beside this one ``others`` (k, reals) holds the reals; ``lists``, ``shared``, ``near`` (k, n),
-    ``slopes`` (k, n) and the samples ``beside`` (k, m, n) are those of ``_beside.follow``.
+    ``slopes``, ``sizes`` (k, n) and the samples ``beside`` (k, m, n) are those of ``_beside.follow``.
 
     Returns RUNNING: call again; else what ``advance`` returned, NOT_FINITE_STATE or RUNAWAY.
     """
@@ -90,7 +91,7 @@ def cover(  # type: ignore[no-untyped-def]
         if others.shape[0] > 0 and counts[DONE] > 0:
             follow(
                 address, integers, reals, others, lists, shared, scratch, times, states, pieces, counts[DONE],
-                fresh, near, slopes, t_eval[first:end], beside[:, first:end],
+                fresh, near, slopes, sizes, t_eval[first:end], beside[:, first:end],
             )  # fmt: skip
         if status < 0:
             return status

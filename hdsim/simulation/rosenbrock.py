@@ -110,7 +110,7 @@ class _Block:
         out = np.full((len(t_eval), len(self.y)), np.nan)
         near = others.y0 - self.y
         beside = np.full((len(near), *out.shape), np.nan)
-        slopes = np.zeros_like(near)
+        slopes, sizes = np.zeros_like(near), np.abs(near)
         progress = np.zeros(2, dtype=np.int64)
         status = compiled.RUNNING
         while status == compiled.RUNNING:
@@ -135,6 +135,7 @@ class _Block:
                 others.shared,
                 near,
                 slopes,
+                sizes,
                 beside,
             )
         return int(status), out, int(progress[_cover.SAMPLED]), beside

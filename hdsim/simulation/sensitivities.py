@@ -4,6 +4,9 @@ For a number p of the scenario the model is built once more with p (1 + STEP), a
 run's own model is integrated by the variational equation along the steps of the run
 (``hdsim.simulation._beside``). What is nonlinear in p is thus one-sided to a part STEP; the states are
 linearised exactly.
+
+A number that moves a corner (of the spring's stiffness, say) leaves no jump in the states' derivatives; those
+of torques jump where the corner is passed.
 """
 
 from __future__ import annotations
@@ -14,6 +17,9 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from hdsim.drive import _layout as layout
 from hdsim.errors import HdsimError, InputError
 from hdsim.nested import at, copied, put
 from hdsim.recording import Column, Table
@@ -26,9 +32,11 @@ if TYPE_CHECKING:
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
 
-#: Part of itself by which a number is moved. The tables of a toothed mesh come from root finding to 1e-9 of
-#: their values: a smaller step would drown in that.
-STEP = 1e-5
+#: Part of itself by which a number is moved: a slider of sharpness p that slips fully is off by 3 p^2 STEP.
+STEP = 1e-8
+#: The same for what changes a toothed mesh. Its tables come from root finding to 1e-9 of their values: a
+#: smaller step would drown in that.
+MESH_STEP = 1e-5
 #: Sections whose numbers do not belong to the model, but for where it starts.
 _NOT_OF_THE_MODEL = ("run", "log", "live")
 _START = "run.start."
@@ -71,7 +79,7 @@ def models_beside(scenario: Scenario, parameters: Sequence[str]) -> Beside:
     model = _model(scenario)
     others, steps = [], []
     for name in parameters:
-        other, step = _moved(scenario, data, name)
+        other, step = _moved(scenario, model, data, name)
         if not alike(model, other, settings.duration_s):
             raise InputError(
                 f"{name}: moving it moves when something happens, or what the model is made of (or the ring "
@@ -133,7 +141,13 @@ def _channels(model: Model) -> set[str]:
     return (set(Observer(model).formulas) | {state.name for state in model.states}) - energies
 
 
-def _moved(scenario: Scenario, data: dict[str, Any], name: str) -> tuple[Model, float]:
+def _meshes_alike(model: Model, other: Model) -> bool:
+    """Whether two models have the same numbers of a mesh."""
+    one, two = (m.system.reals[int(m.system.integers[layout.MESH_AT]) :] for m in (model, other))
+    return np.array_equal(one, two)
+
+
+def _moved(scenario: Scenario, model: Model, data: dict[str, Any], name: str) -> tuple[Model, float]:
     """The model with a number a little larger (or, at its upper bound, smaller), and by how much."""
     path = re.sub(r"\[([0-9]+)\]", r".\1", name)
     try:
@@ -151,14 +165,17 @@ def _moved(scenario: Scenario, data: dict[str, Any], name: str) -> tuple[Model, 
         raise InputError(f"{name} is 0, of which no small part can be taken: give it a value")
     kind = type(scenario)
     trouble: HdsimError | ValueError | None = None
-    for step in (STEP * value, -STEP * value):
+    for part in (STEP, -STEP, MESH_STEP, -MESH_STEP):
         changed = copied(data)
-        put(changed, path, value + step)
+        put(changed, path, value + part * value)
         try:
-            # The step as rounding leaves it.
-            return _model(kind.model_validate(changed)), (value + step) - value
+            other = _model(kind.model_validate(changed))
         except (HdsimError, ValueError) as error:
             trouble = error
+            continue
+        if abs(part) == MESH_STEP or model.teeth is None or _meshes_alike(model, other):
+            # The step as rounding leaves it.
+            return other, (value + part * value) - value
     raise InputError(f"{name} cannot be moved from {value:g}: {trouble}")
 
 

@@ -123,6 +123,21 @@ def test_a_closed_loop_changes_as_runs_of_its_own_say():
             assert np.std(found[channel] - wanted) < 0.01 * np.std(wanted), (name, channel)
 
 
+@pytest.mark.parametrize("name", ["stiffness_k1_nm_per_rad", "torque_t1_nm"])
+def test_a_number_that_moves_a_corner_of_the_spring_is_told_where_the_corner_is_passed(name):
+    scenario = Scenario.model_validate(POSITIONED)
+    name = f"drive.torsion.{name}"
+    result = hdsim.simulate(scenario, sensitivities=[name])
+    corner = scenario.drive.torsion.torque_t1_nm
+    passes = np.diff(np.abs(result["output_torque"]) > corner) != 0
+    assert np.count_nonzero(passes) == 4
+    channels = ["motor_angle", "output_angle", "output_velocity", "output_torque"]
+    for channel, wanted in difference(scenario, name, channels, 1e-4).items():
+        far = result.sensitivities[name][channel] - wanted
+        assert np.std(far) < 0.01 * np.std(wanted), channel
+        assert np.max(np.abs(far)) < 0.02 * np.max(np.abs(wanted)), channel
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("mesh", ["teeth", "tabulated"])
 def test_toothed_drives_change_as_runs_of_their_own_say(mesh):
