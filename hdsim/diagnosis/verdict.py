@@ -131,5 +131,8 @@ class Verdict(Part):
     readings: int = 1
     """Successive readings whose means were compared, of the record that was read fastest; all numbers, gaps
     and their noise are of these means."""
+    short_cut: dict[str, float] = {}
+    """Of a base with teeth, how far predictions by the short cut are from those of the whole model, at the
+    end: standard deviation over the noise, by channel."""
     seconds: dict[str, float] = {}
     """Processor time spent in each step, s."""

@@ -260,20 +260,21 @@ class Model(Contributed):
             scale=scale,
         )
 
-    @property
-    def seen_scale(self) -> Array:
+    def seen_scale(self, closer: float = 1.0) -> Array:
         """Sizes at which errors of the states matter where nobody looks at the ring itself, shape (states,).
 
         A ring's speed counts by what it does to its own twist: at that twist's size, it is the speed of its
         own mode, sqrt(K3 / ring's inertia), some hundred times that of the load's mode. Held to the load's,
         it sets the step: teeth that touch and part stir the ring's speed, but no twist and no torque.
+
+        Args:
+            closer: part of that speed that counts, as its inverse.
         """
         found = self.system.scale.copy()
         if "ring" in self.place_of:
             at, torsion = self.place_of["ring"], self.drive.torsion
-            own = self.drive.inertia.ring_kg_m2
-            own_speed = found[at] * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / own))
-            found[at + 1] = max(found[at + 1], own_speed)
+            own = float(np.sqrt(torsion.stiffness_k3_nm_per_rad / self.drive.inertia.ring_kg_m2))
+            found[at + 1] = max(found[at + 1], found[at] * own / closer)
         return found
 
     def _is_free(self, name: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +24,7 @@ from hdsim.estimate.predict import LoadSource, PredictionError
 from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit
+from hdsim.estimate.short_cut import short_cut_error
 from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
@@ -74,6 +75,7 @@ class Estimation:
         fit: the model as fitted.
         refit: how it was fitted.
         predictions: of all series, ``before`` and ``after``.
+        short_cut: see ``hdsim.estimate.short_cut.short_cut_error``, of the fitted model.
     """
 
     intervals: list[Interval]
@@ -89,6 +91,7 @@ class Estimation:
     fit: Fit
     refit: Refit
     predictions: dict[str, list[Array]]
+    short_cut: dict[str, float] = field(default_factory=dict)
 
     @property
     def moved(self) -> list[str]:
@@ -194,6 +197,7 @@ def estimate(
         found.fit,
         found,
         predictions,
+        short_cut_error(bench, found.fit.predictions, predictions["after"]),
     )
 
 

@@ -70,6 +70,9 @@ class FitResult(Part):
     """Offsets and zeros of each record."""
     data_problems: list[DataProblem] = []
     """What is wrong with the data."""
+    short_cut: dict[str, float] = {}
+    """Of a model with teeth, how far predictions by the short cut are from those of the whole model: standard
+    deviation over the noise, by channel."""
     scenario: str = ""
     """The fitted scenario's file."""
 
@@ -88,6 +91,7 @@ def result_of(found: Estimation) -> FitResult:
             for r in found.readings
         ],
         data_problems=[DataProblem(**vars(problem)) for problem in found.problems],
+        short_cut=found.short_cut,
     )
 
 

@@ -18,7 +18,7 @@ from hdsim.tell import fit_figures
 from hdsim.tell.beside import baselines
 from hdsim.tell.staging import staged
 from hdsim.tell.tables import numbers_table, table
-from hdsim.tell.words import named_number, shown, spoken, started, unit_of
+from hdsim.tell.words import named_number, short_cut_words, shown, spoken, started, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -118,6 +118,8 @@ def page(found: Estimation, result: FitResult, pictures: dict[str, str]) -> str:
     numbers = numbers_table(result.numbers, result.moved)
     gaps = table(GAP_HEAD, gap_rows(result), range(2, len(GAP_HEAD)))
     gaps += "".join(f"<p>{html.escape(started(line))}.</p>" for line in baselines(result.gap))
+    if result.short_cut:
+        gaps += f"<p class='note'>{short_cut_words(result.short_cut)}</p>"
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",

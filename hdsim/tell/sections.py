@@ -13,7 +13,7 @@ from hdsim.diagnosis.screen import LEVEL
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import numbers_table, section, table
-from hdsim.tell.words import percent, short, shown, spoken, started, title_of, titles_of
+from hdsim.tell.words import percent, short, short_cut_words, shown, spoken, started, title_of, titles_of
 
 
 def confusions(verdict: Verdict) -> str:
@@ -167,7 +167,9 @@ def method(found: Findings) -> str:
     listed = "".join(f"<li>{html.escape(step)}</li>" for step in steps)
     spent = sum(found.verdict.seconds.values())
     time = f"<p class='note'>Processor time: {spent:.0f} s.</p>" if spent else ""
-    return section("Method", f"<ol>{listed}</ol>{time}")
+    short_cut = found.verdict.short_cut
+    cut = f"<p class='note'>{short_cut_words(short_cut)}</p>" if short_cut else ""
+    return section("Method", f"<ol>{listed}</ol>{cut}{time}")
 
 
 def written(verdict: Verdict, pictures: Collection[str]) -> str:

@@ -86,6 +86,15 @@ def percent(share: float) -> str:
     return "over 99\u00a0%" if share > 0.995 else f"{100 * share:.0f}\u00a0%"
 
 
+def short_cut_words(parts: Mapping[str, float]) -> str:
+    """How predictions with teeth were made, and how far from the whole model that is."""
+    far = ", ".join(f"{spoken(c)} {100 * part:.2g}\u00a0%" for c, part in parts.items())
+    return (
+        "Fits predicted the teeth from a table and left out their ring's own vibration. What that does to "
+        f"the final model's predictions, as a part of the noise: {far}. The proof rests on the whole model."
+    )
+
+
 def below(chance: float) -> str:
     """A probability in percent; below 0.5 % it is given as a bound, as the draws resolve no less."""
     if not math.isfinite(chance):
