@@ -23,11 +23,27 @@ def teeth_of(
     *,
     extra_half_gap_rad: float,
     seed: int,
+    table_for: str | None = None,
 ) -> Teeth:
     """``Teeth``, kept for the next model: a fit makes hundreds that differ in numbers that no tooth sees.
 
     What it returns is shared: its numbers are to be copied before they are changed.
+
+    Args:
+        drive: see ``Teeth``.
+        mesh: likewise.
+        wind_ups: likewise.
+        extra_half_gap_rad: likewise.
+        seed: likewise.
+        table_for: fingerprint of the teeth that are taken from a table; others are summed, for a table of
+            them would serve once. As the mesh says when None.
     """
+    if table_for is not None:
+        given: Any = {"extra_half_gap_rad": extra_half_gap_rad, "seed": seed}
+        summed = teeth_of(drive, _as(TeethMesh, mesh), wind_ups, **given)
+        if summed.fingerprint != table_for:
+            return summed
+        return teeth_of(drive, _as(TabulatedMesh, mesh), wind_ups, **given)
     if isinstance(mesh.contact, TableLawParameters):
         # Its file may change between two drives of one process.
         found = Teeth(drive, mesh, wind_ups, extra_half_gap_rad=extra_half_gap_rad, seed=seed)
@@ -40,6 +56,14 @@ def teeth_of(
     found = _kept_teeth(bare, tuple(wind_ups), extra_half_gap_rad, seed)
     found.warn()
     return found
+
+
+def _as(kind: type[TeethMesh | TabulatedMesh], mesh: ToothedMesh) -> ToothedMesh:
+    """The same teeth, summed or from a table."""
+    if isinstance(mesh, kind):
+        return mesh
+    common = {name: getattr(mesh, name) for name in ToothedMesh.model_fields}
+    return kind.model_validate(common | {"model": "tabulated" if kind is TabulatedMesh else "teeth"})
 
 
 @lru_cache(maxsize=16)

@@ -42,6 +42,8 @@ class Model(Contributed):
         seed: seed of the random tooth surfaces and of all noise.
         audited: the energies supplied, delivered and dissipated are states, and every part's heat has its
             account: what the energy audit needs.
+        table_for: of a toothed mesh, ``Teeth.fingerprint`` of the teeth whose table serves for their sum; as
+            the drive's mesh says when None.
 
     Attributes:
         system: the ODE, a ``hdsim.system.System``.
@@ -61,8 +63,10 @@ class Model(Contributed):
         signals: Mapping[str, Any] | None = None,
         seed: int = 0,
         audited: bool = True,
+        table_for: str | None = None,
     ) -> None:
         super().__init__()
+        self._table_for = table_for
         self.drive = drive
         self.audited = audited
         self.parts = tuple(parts)
@@ -144,9 +148,10 @@ class Model(Contributed):
             self._given.wind_ups,
             extra_half_gap_rad=self._given.half_gap_rad,
             seed=self.seed,
+            table_for=self._table_for,
         )
         self.teeth = with_odd_teeth(self.teeth, self._given.odd_teeth)
-        kernel = _mesh.table_mesh if isinstance(mesh, TabulatedMesh) else _mesh.teeth_mesh
+        kernel = _mesh.table_mesh if isinstance(self.teeth.mesh, TabulatedMesh) else _mesh.teeth_mesh
         return kernel, self.teeth.parameters
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from hashlib import sha256
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +71,7 @@ class Teeth:
 
     Attributes:
         parameters: the compiled mesh's numbers.
+        fingerprint: of all that the teeth's potential depends on.
         half_gaps_m: shape (teeth,), average half-gap of each tooth, m.
         pitch_errors_m: shape (teeth,), m.
         law: contact of one tooth pair, bending included.
@@ -124,8 +126,10 @@ class Teeth:
         teeth = [*self._blocks]
         self._place_structure(wind_ups)
         header[place.EXTRA_GAP] = new[place.EXTRA_GAP] = extra_gap
+        alone = np.concatenate([new, *teeth[1:]])
+        self.fingerprint = sha256(alone.tobytes()).hexdigest()
         if isinstance(mesh, TabulatedMesh):
-            self._place_table(mesh, np.concatenate([new, *teeth[1:]]))
+            self._place_table(mesh, alone)
         self.parameters = np.concatenate(self._blocks)
 
     def _place(self, values: Array) -> int:

@@ -12,6 +12,8 @@ from hdsim.estimate.data_problems import Check
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.predict import LoadSource, Locked, predictors
 from hdsim.estimate.records import Record, record_from
+from hdsim.estimate.short_cut import take_short_cut
+from hdsim.estimate.state import state_of
 from hdsim.estimate.thin import over, thinned
 
 if TYPE_CHECKING:
@@ -83,4 +85,6 @@ def bench_for(
     training, proving = (
         predictors(many, ratio, load=load, locked=locked, arm=scenario.load.arm) for many in (records, held)
     )
-    return Bench(training, proving, zeros)
+    bench = Bench(training, proving, zeros)
+    take_short_cut(bench, state_of(scenario))
+    return bench

@@ -172,6 +172,9 @@ class Predictor:
         self.course = arm_course(record, arm) if arm is not None and plan.load != "output_torque" else None
         self.ratio = ratio
         self.runs = 0
+        #: Of drives with teeth (``hdsim.estimate.short_cut``): no short cut; whose teeth are in a table.
+        self.whole = False
+        self.table_for: str | None = None
 
     def turn(self, angle: float) -> None:
         """Turn the prescribed motion: only where a side is locked does its zero mean anything.
@@ -295,13 +298,14 @@ class Predictor:
             }
         try:
             model = Model(
-                candidate.drive.resolved(),
+                candidate.drive.resolved().settled(),
                 parts,
                 load_inertia_kg_m2=inertia,
                 motions=motions,
                 signals=self.signals,
                 seed=candidate.seed,
                 audited=False,
+                table_for=None if self.whole else self.table_for,
             )
         except PhysicsError as error:
             raise PredictionError(str(error)) from None
@@ -312,7 +316,7 @@ class Predictor:
         if self._slow is not None:
             asked["output_torque"] = None
         try:
-            atol = self.rtol * model.seen_scale
+            atol = self.rtol * (model.system.scale if self.whole else model.seen_scale)
             got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol, atol=atol)
         except RunFailed as error:
             raise PredictionError(str(error)) from None

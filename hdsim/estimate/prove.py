@@ -9,6 +9,7 @@ import numpy as np
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Gap
 from hdsim.estimate.records import Array
+from hdsim.estimate.short_cut import whole_models
 from hdsim.estimate.state import State
 from hdsim.log.mapping import MEASURED
 
@@ -23,7 +24,8 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
         bench: the measured series with their held-out parts.
         states: the three models.
     """
-    predictions = {stage: bench.predict(state, everything=True) for stage, state in states.items()}
+    with whole_models(bench):
+        predictions = {stage: bench.predict(state, everything=True) for stage, state in states.items()}
     residuals = {stage: bench.residuals(found, drift=True) for stage, found in predictions.items()}
     rng = np.random.default_rng(17)
     result = {}
