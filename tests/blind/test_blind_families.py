@@ -2,7 +2,9 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 
+import family_teeth
 import family_toothed
 import numpy as np
 import pytest
@@ -185,6 +187,28 @@ def test_a_toothed_case_follows_from_number_and_seed(number):
     first, again = family_toothed.draw(number, 0), family_toothed.draw(number, 0)
     check_case(first, "toothed")
     assert same(first, again)
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_a_case_with_a_base_that_has_teeth_follows_from_number_and_seed(number):
+    first, again = family_teeth.draw(number, 0), family_teeth.draw(number, 0)
+    check_case(first, "teeth")
+    assert same(first, again)
+    assert scenario_of(first.base).drive.mesh.model == "tabulated"
+
+
+def test_a_wider_gap_is_before_the_same_structure():
+    """A plant's cup and bearing are the base's, whatever its catalogue's secants say."""
+    d = draw_drive(np.random.default_rng(3), arm=True)
+    plain = family_teeth.Drawn("teeth", "static", 1.0, 5)
+    wide = replace(plain, gap=2.5)
+    other = family_teeth.behind_the_same_structure(d, plain, wide)
+    torque = np.array([0.5 * d.torques[0], d.torques[0], d.torques[1], 1.5 * d.torques[1]])
+    (first, _), (second, _) = (
+        family_teeth.mesh_of(family_teeth.with_teeth(*pair)) for pair in ((d, plain), (other, wide))
+    )
+    assert second.half_gaps_m == pytest.approx(2.5 * first.half_gaps_m)
+    assert second.structure_wind_up(torque) == pytest.approx(first.structure_wind_up(torque), rel=1e-6)
 
 
 def same(a: Case, b: Case) -> bool:

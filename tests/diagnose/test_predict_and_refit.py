@@ -232,8 +232,8 @@ def test_an_effect_at_the_end_of_its_range_says_so():
         assert Added("stribeck_friction", fitting, (1.0,), (value,)).at_limit is at_limit
 
 
-#: The curve of what has no name, and teeth that no base of a diagnosis has.
-NEVER_FITTED = {"table", "mesh_preload"}
+#: The curve of what has no name.
+NEVER_FITTED = {"table"}
 
 
 @pytest.mark.parametrize("name", sorted(set(catalogue()) - NEVER_FITTED))

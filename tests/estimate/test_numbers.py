@@ -264,7 +264,9 @@ def _empty():
 def test_whatever_a_fits_bounds_allow_is_a_legal_effect(name):
     for fitting in catalogue()[name].fittings:
         if any(shape.over_range for shape in fitting.shapes) or any(term.of_range for term in fitting.terms):
-            fitting = fitting.within({"torque_nm": 50.0, "motor_side_torque_nm": 0.5, "twist_arcmin": 5.0})
+            pitches = {"flexspline_pitch_deg": 1.8, "circular_spline_pitch_deg": 1.78}
+            torques = {"torque_nm": 50.0, "motor_side_torque_nm": 0.5}
+            fitting = fitting.within(torques | pitches | {"twist_arcmin": 5.0})
         periodic = any(isinstance(term, Periodic) for term in fitting.terms)
         orders = (1.0, 2.0) if periodic else ()
         units = (1.0,) * fitting.count(orders)

@@ -32,6 +32,7 @@ EXPECTED = {
     "lugre_friction.static_nm": "N m",
     "lugre_friction.stiffness_nm_per_rad": "N m/rad",
     "lugre_friction.stribeck_velocity_rad_per_s": "rad/s",
+    "mesh_preload.interference_arcmin": "arcmin",
     "motor_torque_ripple.components.cogging_nm": "N m",
     "motor_torque_ripple.components.order": "",
     "motor_torque_ripple.components.phase_deg": "deg",
@@ -71,6 +72,8 @@ EXPECTED = {
     "wave_generator_compliance.stiffness_nm_per_rad": "N m/rad",
     "wave_generator_eccentricity.eccentricity_um": "µm",
     "wave_generator_eccentricity.phase_deg": "deg",
+    "tooth_error.shift_um": "µm",
+    "tooth_error.tooth": "",
 }
 OF_THE_MODEL = {
     "drive.inertia.motor_kg_m2": "kg m²",
