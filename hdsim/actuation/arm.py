@@ -211,6 +211,12 @@ class ArmTorque:
         self.inertia_kg_m2 = float(np.mean(inertia))
         self._lag = LAG_S if float(np.ptp(inertia)) > STILL * self.inertia_kg_m2 else 0.0
 
+    @property
+    def start(self) -> Array:
+        """The terms at the course's begin: constant, cosine and sine of q and of 2 q, inertia; shape (6,)."""
+        first: Array = self._terms[0]
+        return first
+
     def contribute(self, build: Builder) -> None:
         """Add the torque, and where the inertia changes a state that hears the acceleration."""
         import numpy as np

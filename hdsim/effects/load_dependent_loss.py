@@ -96,14 +96,22 @@ class LoadDependentLoss(Effect):
     smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Motor speed w_s over which the sign is smoothed, rad/s."""
 
+    @property
+    def back_driving(self) -> float:
+        """c_B, given or c_L."""
+        return self.coefficient if self.back_driving_coefficient is None else self.back_driving_coefficient
+
+    @property
+    def mean_coefficient(self) -> float:
+        """Mean of c_L and c_B."""
+        return 0.5 * (self.coefficient + self.back_driving)
+
     def contribute(self, build: Builder) -> None:
         """Add the loss to the motor's friction."""
-        driving, back = self.coefficient, self.back_driving_coefficient
-        back = driving if back is None else back
         numbers = [
-            0.5 * (driving + back) / abs(build.ratio),
+            self.mean_coefficient / abs(build.ratio),
             self.smoothing_torque_nm,
             self.smoothing_velocity_rad_per_s,
-            0.5 * (driving - back) / build.ratio,
+            0.5 * (self.coefficient - self.back_driving) / build.ratio,
         ]
         build.element(mesh_loss, numbers)

@@ -65,11 +65,12 @@ def export(
         from hdsim.export.mujoco import export_mujoco
 
         lost = export_mujoco(hdsim.load_scenario(source), out)
-        table_of = Table("not as in the scenario", "in the file", "with hdsim.export.mujoco.Rest")
+        table_of = Table(
+            "not as in the scenario", "in the file", "torque differs, rms", "with hdsim.export.mujoco.Rest"
+        )
         for one in lost:
-            table_of.add_row(
-                one.what, one.instead, "as in the scenario" if one.by_callback else "as in the file"
-            )
+            back = "as in the scenario" if one.by_callback else "as in the file"
+            table_of.add_row(one.what, one.instead, one.figure, back)
         console().print(table_of)
         click.echo(out)
     elif out.suffix in LOGS:

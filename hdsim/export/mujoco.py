@@ -1,15 +1,14 @@
-"""A scenario's joint as MJCF for MuJoCo 4 (https://mujoco.readthedocs.io), and the rest as its callback.
+"""A scenario's joint as MJCF for MuJoCo (https://mujoco.readthedocs.io), and the rest as its callback.
 
-Two hinges, ``motor`` and ``output``, coupled by a fixed tendon of length motor angle / ratio - output angle,
-the twist: its spring is an odd cubic fitted to hdsim's own torque over twist, with a dead band for play. What
-the format cannot say is in a table, and ``Rest`` computes it while MuJoCo simulates.
+Two hinges, ``motor`` and ``output``, coupled by fixed tendons of length motor angle / ratio - output angle,
+the twist: their springs with dead bands add up to hdsim's own torque over twist, play included. What the
+format cannot say is in a table, and ``Rest`` computes it while MuJoCo simulates.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -18,67 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.actuation.command import FreeCommand, TorqueCommand
-from hdsim.drive.contributed import Contributed
+from hdsim.actuation.loads import STANDARD_GRAVITY
 from hdsim.drive.parameters import Friction, RigidMesh
+from hdsim.effects.load_dependent_loss import LoadDependentLoss
 from hdsim.errors import InputError
+from hdsim.export.mujoco_lost import Lost, Weighing
+from hdsim.export.mujoco_spring import Probe, straight_spring
 
 if TYPE_CHECKING:
-    from hdsim.actuation.loads import GravityArm
-    from hdsim.parts import Effect
     from hdsim.scenario import Scenario
 
 Array = NDArray[np.float64]
 
 #: Step of the exported model, s; a drive's own resonances, motor locked, lie below 1 kHz.
 TIMESTEP_S = 1e-4
-#: Twists at which the spring is fitted, up to that of rated torque.
-_POINTS = 40
 _AXIS = "0 1 0"
-
-
-@dataclass(frozen=True)
-class Lost:
-    """Something of a scenario that the file says otherwise, or not at all.
-
-    Args:
-        what: of the scenario.
-        instead: what the file has in its place.
-        by_callback: whether ``Rest`` brings it back.
-    """
-
-    what: str
-    instead: str
-    by_callback: bool = True
-
-
-class _Probe(Contributed):
-    """Finds out what an effect adds to a model."""
-
-    def __init__(self, scenario: Scenario, effect: Effect) -> None:
-        super().__init__()
-        self.ratio, self.rated_torque_nm = scenario.drive.ratio, scenario.drive.rated_torque_nm
-        self.seed = scenario.run.seed
-        effect.contribute(self)
-        self.frictions = self._given.input_frictions
-        self.only_spring = not (self._given.elements or self._given.twists or self._given.sensors)
-        self.only_friction = len(self._given.elements) == len(self.frictions) == 1 and not self._given.twists
-
-
-@dataclass(frozen=True)
-class Spring:
-    """torque = k s + c s^3 of s, the twist less a dead band of +- half_gap_rad.
-
-    Args:
-        stiffness: k, N m/rad.
-        cubic: c, N m/rad^3.
-        half_gap_rad: at the output.
-        error: rms deviation from hdsim's torque over its rms.
-    """
-
-    stiffness: float
-    cubic: float
-    half_gap_rad: float
-    error: float
 
 
 def export_mujoco(scenario: Scenario, out: str | Path) -> tuple[Lost, ...]:
@@ -89,12 +42,12 @@ def export_mujoco(scenario: Scenario, out: str | Path) -> tuple[Lost, ...]:
         out: the file, ``.xml``.
 
     Returns:
-        What the file does not hold; it is in the file, too, as a comment.
+        What the file does not hold, and what that does to the torque; it is in the file, too, as a comment.
 
     Raises:
         InputError: ``out`` cannot be written.
     """
-    text, lost = mjcf(scenario)
+    text, lost = mjcf(scenario, weigh=True)
     out = Path(out)
     partial = out.with_name(out.name + ".partial")
     try:
@@ -106,24 +59,45 @@ def export_mujoco(scenario: Scenario, out: str | Path) -> tuple[Lost, ...]:
     return lost
 
 
-def mjcf(scenario: Scenario) -> tuple[str, tuple[Lost, ...]]:
-    """A scenario's joint as MJCF, and what that leaves out."""
+def mjcf(scenario: Scenario, *, weigh: bool = False) -> tuple[str, tuple[Lost, ...]]:
+    """A scenario's joint as MJCF, and what that leaves out.
+
+    Args:
+        scenario: the joint.
+        weigh: whether to find what each thing that is left out does to the torque: a run of hdsim for each.
+
+    Returns:
+        The text, and what is lost. Friction that grows with the load is set by a run of the scenario's first
+        seconds.
+    """
     drive, load = scenario.drive, scenario.load
     lost: list[Lost] = []
     frictions = [(drive.friction.coulomb_nm, drive.friction.viscous_nm_s_per_rad)]
+    weighing = Weighing(scenario)
+    growing = drive.friction.load_coefficient
     for name, effect in scenario.effects.active().items():
-        probe = _Probe(scenario, effect)
+        without: dict[str, Any] = {f"effects.{name}": None}
+        probe = Probe(scenario, effect)
         if probe.only_friction:
             frictions += [(f.coulomb_nm, f.viscous_nm_s_per_rad) for f in probe.frictions]
+        elif isinstance(effect, LoadDependentLoss):
+            growing += effect.mean_coefficient
         elif not probe.only_spring:
-            sensors = name == "sensors"
-            lost.append(Lost(f"effect {name}: {effect.title}", "nothing", by_callback=not sensors))
-    if drive.friction.load_coefficient > 0:
-        lost.append(Lost("friction that grows with the load", "friction without load"))
+            lost.append(Lost(f"effect {name}: {effect.title}", "nothing", name != "sensors", without))
+    if growing > 0:
+        # MJCF has no friction that grows with a torque: that of the mean stands in for it.
+        mean = weighing.mean_torque_nm
+        frictions.append((growing * mean / abs(drive.ratio), 0.0))
+        without = {"drive.friction.load_coefficient": 0.0}
+        if scenario.effects.active().keys() & {"load_dependent_loss"}:
+            without["effects.load_dependent_loss"] = None
+        told = f"friction of the mean torque, {mean:.3g} N m"
+        lost.append(Lost("friction that grows with the load", told, without=without))
     coulomb, viscous = (sum(column) for column in zip(*frictions, strict=True))
     motor = drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2
     with_output = drive.arrangement == "circular_spline_fixed"
-    output = load.inertia_kg_m2 + (drive.inertia.ring_kg_m2 if with_output else 0.0)
+    hanging = _Hanging(scenario)
+    output = hanging.inertia_kg_m2 + (drive.inertia.ring_kg_m2 if with_output else 0.0)
     if isinstance(drive.mesh, RigidMesh):
         coupling = (
             '<equality><joint name="drive" joint1="output" joint2="motor" '
@@ -131,24 +105,19 @@ def mjcf(scenario: Scenario) -> tuple[str, tuple[Lost, ...]]:
             f'solref="{3 * TIMESTEP_S!r} 1" solimp="0.9999 0.9999 0.001"/></equality>'
         )
     else:
-        spring = fitted_spring(scenario)
-        lost.append(
-            Lost(
-                "stiffness over the torque, as hdsim has it",
-                f"a cubic of the twist, {100 * spring.error:.1f} % rms off up to rated torque",
-            )
-        )
+        spring = straight_spring(scenario)
+        error = f"straight segments, {100 * spring.error:.1f} % of rated torque off at most"
+        lost.append(Lost("stiffness over the torque", error))
         if drive.mesh.model != "lumped":
-            lost.append(Lost("teeth: their own inertia, gaps and forces over the turn", "a spring"))
-        half = spring.half_gap_rad
-        gap = f' springlength="{-half!r} {half!r}"' if half else ""
-        coupling = (
-            f'<tendon><fixed name="drive" stiffness="{spring.stiffness!r} 0 {spring.cubic!r}" '
-            f'damping="{drive.torsion.damping_nm_s_per_rad!r}"{gap}>'
-            f'<joint joint="motor" coef="{1 / drive.ratio!r}"/>'
-            '<joint joint="output" coef="-1"/></fixed></tendon>'
+            without = {"drive.mesh": {"model": "lumped"}}
+            gone = "teeth: their own inertia, gaps and forces over the turn"
+            lost.append(Lost(gone, "springs, with a dead band for the gap", without=without))
+        coupling = "<tendon>" + "\n    ".join(
+            _tendon(number, band, stiffness, drive.torsion.damping_nm_s_per_rad, drive.ratio)
+            for number, (band, stiffness) in enumerate(spring.bands, 1)
         )
-        if half and drive.torsion.damping_nm_s_per_rad:
+        coupling += "</tendon>"
+        if spring.half_gap_rad and drive.torsion.damping_nm_s_per_rad:
             lost.append(Lost("damping in contact only", "damping within the play, too"))
     command = scenario.command.motor
     if not isinstance(command, TorqueCommand | FreeCommand):
@@ -161,21 +130,19 @@ def mjcf(scenario: Scenario) -> tuple[str, tuple[Lost, ...]]:
     if not isinstance(scenario.command.output, FreeCommand):
         kind = scenario.command.output.type
         lost.append(Lost(f"motion of the output: {kind}", "an output that is free", by_callback=False))
-    gravity, inertial = 9.80665, _inertial(output)
-    arm = load.gravity
-    if arm is not None and _own_inertia(arm, output) > 0:
-        gravity, inertial = arm.gravity_m_per_s2, _arm(arm, output)
-    elif arm is not None:
-        lost.append(Lost("gravity: the arm has more inertia than the load", "nothing"))
+    inertial = hanging.inertial(output)
+    lost += hanging.lost
     limit = getattr(command, "torque_limit_nm", None)
     most = f' ctrllimited="true" ctrlrange="{-limit!r} {limit!r}"' if limit else ""
     name = quoteattr(scenario.name or "joint")
+    if weigh:
+        lost = list(weighing.weighed(lost))
     text = f"""<mujoco model={name}>
   <!--
 {_table(lost)}
   -->
   <compiler angle="radian"/>
-  <option timestep="{TIMESTEP_S!r}" integrator="implicitfast" gravity="0 0 {-gravity!r}">
+  <option timestep="{TIMESTEP_S!r}" integrator="implicitfast" gravity="0 0 {-hanging.gravity_m_per_s2!r}">
     <flag contact="disable"/>
   </option>
   <worldbody>
@@ -199,66 +166,76 @@ def mjcf(scenario: Scenario) -> tuple[str, tuple[Lost, ...]]:
     return text, tuple(lost)
 
 
-def fitted_spring(scenario: Scenario) -> Spring:
-    """MuJoCo's spring by least squares on hdsim's torque over twist, motor held, output turned slowly."""
-    from scipy.optimize import nnls
-
-    from hdsim.simulation.stepped import SteppedPlant
-
-    drive = scenario.drive
-    plain = scenario.model_copy(update={"effects": type(scenario.effects)(**_springs(scenario))})
-    plant = SteppedPlant(plain, motor="motion", output="motion")
-
-    def torque(twist: float) -> float:
-        plant.hold({"prescribed_output_angle": -twist})
-        return plant.values(["output_torque"])["output_torque"]
-
-    reach = drive.rated_torque_nm / drive.torsion.stiffness_k3_nm_per_rad
-    while torque(reach) < drive.rated_torque_nm:
-        reach *= 1.1
-    low, high = 0.0, reach
-    while high - low > 1e-7 * reach:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if torque(middle) <= 1e-9 * drive.rated_torque_nm else (low, middle)
-    half_gap = low if low > 1e-6 * reach else 0.0
-    twists = half_gap + (reach - half_gap) * np.arange(1, _POINTS + 1) / _POINTS
-    torques = np.array([0.5 * (torque(twist) - torque(-twist)) for twist in twists])
-    s = (twists - half_gap) / (reach - half_gap)
-    basis = np.column_stack([s, s**3])
-    # None below zero: beyond the points the spring must not give way.
-    found, _ = nnls(basis / torques[:, None], np.ones(_POINTS))
-    error = float(np.linalg.norm(basis @ found - torques) / np.linalg.norm(torques))
-    first, cubic = found.tolist()
-    return Spring(first / (reach - half_gap), cubic / (reach - half_gap) ** 3, half_gap, error)
-
-
-def _springs(scenario: Scenario) -> dict[str, Effect]:
-    """The effects that do nothing but change the spring."""
-    active = scenario.effects.active().items()
-    return {name: effect for name, effect in active if _Probe(scenario, effect).only_spring}
-
-
 def _inertial(inertia: float) -> str:
     """A body that is turned about its own centre."""
     return f'<inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'
 
 
-def _own_inertia(arm: GravityArm, inertia: float) -> float:
-    """Inertia about the arm's own centre of mass, kg m^2 (Steiner)."""
-    return inertia - arm.mass_kg * arm.centre_of_mass_m**2
+def _tendon(number: int, band: float, stiffness: float, damping: float, ratio: float) -> str:
+    """One spring between the joints; the first has the damping."""
+    name = "drive" if number == 1 else f"drive_{number}"
+    gap = f' springlength="{-band!r} {band!r}"' if band else ""
+    damper = f' damping="{damping!r}"' if number == 1 else ""
+    return (
+        f'<fixed name="{name}" stiffness="{stiffness!r}"{damper}{gap}>'
+        f'<joint joint="motor" coef="{1 / ratio!r}"/><joint joint="output" coef="-1"/></fixed>'
+    )
 
 
-def _arm(arm: GravityArm, inertia: float) -> str:
-    """A body whose centre of mass points down at the hanging angle; z is up, the axis is y."""
-    hanging, length = math.radians(arm.hanging_angle_deg), arm.centre_of_mass_m
-    place = f"{length * math.sin(hanging)!r} 0 {-length * math.cos(hanging)!r}"
-    own = _own_inertia(arm, inertia)
-    return f'<inertial pos="{place}" mass="{arm.mass_kg!r}" diaginertia="{own!r} {own!r} {own!r}"/>'
+class _Hanging:
+    """What hangs on the output, as a mass on a lever: torque -(c cos q + s sin q) of the output's angle q.
+
+    Attributes:
+        inertia_kg_m2: of the load; of an arm its mean over the run.
+        gravity_m_per_s2: acceleration of free fall.
+        arm: c and s of an arm's gravity, its other joints as they stand at the start, N m.
+        lost: what is said otherwise than in the scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        load, self.lost = scenario.load, []  # type: tuple[Any, list[Lost]]
+        arms, self.inertia_kg_m2 = load.over(scenario.run.duration_s)
+        self.gravity_m_per_s2 = load.gravity.gravity_m_per_s2 if load.gravity else STANDARD_GRAVITY
+        self.arm = (0.0, 0.0)
+        c = s = 0.0
+        if load.gravity:
+            angle = math.radians(load.gravity.hanging_angle_deg)
+            moment = load.gravity.mass_kg * load.gravity.centre_of_mass_m * self.gravity_m_per_s2
+            c, s = -moment * math.sin(angle), moment * math.cos(angle)
+        if load.arm is not None:
+            c_arm, s_arm = arms[-1].start[1:3]
+            self.arm = (float(c_arm), float(s_arm))
+            what = "arm: what its other joints do, and its inertia over their angles"
+            self.lost.append(Lost(what, "its gravity as it stands at the start, its mean inertia"))
+        c, s = c + self.arm[0], s + self.arm[1]
+        # Mass times lever, kg m, and the angle at which it hangs.
+        self._moment, self._angle = math.hypot(c, s) / self.gravity_m_per_s2, math.atan2(-c, s)
+        self._lever = load.gravity.centre_of_mass_m if load.gravity and load.arm is None else math.inf
+
+    def inertial(self, inertia: float) -> str:
+        """The output's inertia about its axis and its centre of mass; z is up, the axis is y."""
+        if not self._moment:
+            return _inertial(inertia)
+        # A mass of its own on its own lever where the inertia has room for it (Steiner).
+        lever = self._lever
+        if not self._moment * lever < inertia:
+            lever = 0.5 * inertia / self._moment
+            if math.isfinite(self._lever):
+                told = f"{self._moment / lever:.4g} kg at {lever:.4g} m: the same moment and inertia"
+                self.lost.append(Lost("gravity: a mass with more inertia than the load", told))
+        own = inertia - self._moment * lever
+        place = f"{lever * math.sin(self._angle)!r} 0 {-lever * math.cos(self._angle)!r}"
+        mass = self._moment / lever
+        return f'<inertial pos="{place}" mass="{mass!r}" diaginertia="{own!r} {own!r} {own!r}"/>'
 
 
 def _table(lost: list[Lost]) -> str:
     """What was lost, for the comment in the file."""
-    rows = [f"  - {one.what}; here: {one.instead}" for one in lost] or ["  - nothing"]
+    rows = []
+    for one in lost:
+        by = f"; the torque differs by {one.figure} (rms)" if one.share is not None else ""
+        rows.append(f"  - {one.what}; here: {one.instead}{by}")
+    rows = rows or ["  - nothing"]
     head = "  A joint by hdsim. Not as in the scenario (hdsim.export.mujoco.Rest brings most of it back):"
     return "\n".join([head, *rows]).replace("--", "- -")
 
@@ -293,15 +270,14 @@ class Rest:
         self._motor, self._output = (model.joint(prefix + name) for name in ("motor", "output"))
         frictionless = Friction(smoothing_velocity_rad_per_s=self._friction.smoothing_velocity_rad_per_s)
         drive = scenario.drive.model_copy(update={"friction": frictionless})
-        load = scenario.load
-        arm = load.gravity
-        if arm is not None and _own_inertia(arm, load.inertia_kg_m2) > 0:
-            load = load.model_copy(update={"gravity": None})
+        # The file has the gravity; that of an arm is within all else that the arm does.
+        load = scenario.load.model_copy(update={"gravity": None})
+        self._arm = _Hanging(scenario).arm
         alone = scenario.model_copy(update={"drive": drive, "load": load})
         self._plant = SteppedPlant(alone, motor="motion", output="motion")
-        tendon = model.tendon(prefix + "drive").id
-        for numbers in (model.tendon_stiffness, model.tendon_stiffnesspoly, model.tendon_damping):
-            numbers[tendon] = 0.0
+        springs = [k for k in range(model.ntendon) if model.tendon(k).name.startswith(prefix + "drive")]
+        model.tendon_stiffness[springs] = 0.0
+        model.tendon_damping[springs] = 0.0
         dof = self._motor.dofadr[0]
         model.dof_damping[dof] = self._friction.viscous_nm_s_per_rad
         self.output_torque_nm = 0.0
@@ -322,7 +298,9 @@ class Rest:
         self._plant.hold(_motion(angles, speeds))
         found = self._plant.values(["motor_torque", "load_torque", "output_torque"])
         self.output_torque_nm = found["output_torque"]
-        data.qfrc_passive[dofs] -= [found["motor_torque"], found["load_torque"]]
+        c, s = self._arm
+        twice = c * math.cos(angles[1]) + s * math.sin(angles[1])
+        data.qfrc_passive[dofs] -= [found["motor_torque"], found["load_torque"] - twice]
         loaded = self._friction.load_coefficient * abs(self.output_torque_nm) / self._ratio
         model.dof_frictionloss[dofs[0]] = self._friction.coulomb_nm + loaded
 

@@ -67,6 +67,7 @@ class Observer:
         self.model = model
         self.reference = reference
         self._start_energy: float | None = None
+        self._plans: dict[tuple[str, ...], tuple[dict[str, int], list[str], NDArray[np.int64]]] = {}
         integers = model.system.integers
         self._columns = int(integers[a.COLUMNS])
         self._kept = a.S_INPUTS + self._columns + OWN + len(model.states)
@@ -146,8 +147,20 @@ class Observer:
         Raises:
             InputError: there is no such channel.
         """
+        key = tuple(channels)
+        if key not in self._plans:
+            self._plans[key] = self._plan(key)
+        own, chosen, places = self._plans[key]
+        found = {name: np.ascontiguousarray(states[:, k]) for name, k in own.items()}
+        columns = iter(np.ascontiguousarray(self._observed(places, times, states, inside).T))
+        for name in chosen:
+            formula = self.formulas[name]
+            found[name] = formula.of(*(next(columns) for _ in formula.places))
+        return found
+
+    def _plan(self, channels: Sequence[str]) -> tuple[dict[str, int], list[str], NDArray[np.int64]]:
+        """Channels that are states with their index, the others, and where their numbers stand."""
         own = {state.name: k for k, state in enumerate(self.model.states, self._first_state)}
-        found = {name: np.ascontiguousarray(states[:, own[name]]) for name in channels if name in own}
         chosen = [name for name in channels if name not in own]
         for name in chosen:
             if name not in self.formulas:
@@ -155,11 +168,7 @@ class Observer:
                     f"the model has no channel {name!r}; there are: {', '.join([*self.formulas, *own])}"
                 )
         places = np.array([p for name in chosen for p in self.formulas[name].places], dtype=np.int64)
-        columns = iter(np.ascontiguousarray(self._observed(places, times, states, inside).T))
-        for name in chosen:
-            formula = self.formulas[name]
-            found[name] = formula.of(*(next(columns) for _ in formula.places))
-        return found
+        return {name: own[name] for name in channels if name in own}, chosen, places
 
     def _observed(
         self,
@@ -173,7 +182,7 @@ class Observer:
         """The numbers of the scratch at some places, shape (samples, places)."""
         system = self.model.system
         rows = np.empty((len(times), len(places)))
-        if not np.setdiff1d(places, self._coordinates).size:
+        if self._coordinates.issuperset(places.tolist()):
             observe_coordinates(
                 times,
                 np.ascontiguousarray(states),
@@ -203,15 +212,15 @@ class Observer:
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Channels that angles and velocities alone tell: a tenth of what the others cost."""
-        return tuple(name for name, f in self.formulas.items() if set(f.places) <= set(self._coordinates))
+        return tuple(name for name, f in self.formulas.items() if self._coordinates.issuperset(f.places))
 
-    @property
-    def _coordinates(self) -> list[int]:
+    @cached_property
+    def _coordinates(self) -> set[int]:
         """Places of the scratch that are known before any torque."""
         if self.model.rigid:
-            return []
+            return set()
         bodies = (0, 1, 2) if self.model.has_ring else (0, 2)
-        return [first + body for first in (a.S_ANGLES, a.S_VELOCITIES) for body in bodies]
+        return {first + body for first in (a.S_ANGLES, a.S_VELOCITIES) for body in bodies}
 
     @property
     def _first_state(self) -> int:

@@ -58,8 +58,9 @@ class SteppedPlant:
     Sensors (effect ``sensors``) are left out: outputs are the true channels.
 
     Args:
-        scenario: drive, effects, inertia and gravity of the load, controller, start, tolerances. Trajectories
-            and torques over time are left out.
+        scenario: drive, effects, inertia, gravity and arm of the load, controller, start, tolerances. The
+            command's trajectories and the load torque over time are left out; an arm's other joints move as
+            it says, and stand where they are at the end of its ``run.duration_s``.
         motor: ``torque`` (input ``motor_torque``); ``angle`` or ``velocity`` (inputs ``commanded_...`` of the
             scenario's controller, at the side of its trajectory); ``motion`` (``prescribed_motor_...``). What
             the scenario's motor command is when None.
@@ -85,13 +86,15 @@ class SteppedPlant:
         self, scenario: Scenario, *, motor: MotorInput | None = None, output: OutputInput | None = None
     ) -> None:
         self._given = [motor_given(scenario, motor), output_given(scenario, output)]
-        gravity = scenario.load.gravity
-        parts = [*scenario.effects.active().values(), *([gravity] if gravity else [])]
+        # An arm's other joints move as the scenario says: they are part of what hangs on the output.
+        untouched = scenario.load.model_copy(update={"torque": None})
+        loads, inertia = untouched.over(scenario.run.duration_s)
+        parts = [*scenario.effects.active().values(), *loads]
         parts += [one.part for one in self._given if one.part is not None]
         self.model = Model(
             scenario.drive,
             parts,
-            load_inertia_kg_m2=scenario.load.inertia_kg_m2,
+            load_inertia_kg_m2=inertia,
             motions={one.axis: one.signal for one in self._given if one.axis},
             seed=scenario.run.seed,
             audited=False,

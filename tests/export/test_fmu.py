@@ -14,10 +14,14 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from hdsim import cli
+from hdsim.actuation.command import PositionCommand
 from hdsim.errors import InputError
 from hdsim.export.fmu import export_fmu
+from hdsim.recording import Recording
 from hdsim.scenario import Scenario
 from hdsim.simulation.simulate import simulate
+
+from importing import SHIPPED, deviation, loaded  # isort: skip
 
 STEP = 1e-3
 #: 20 rad/s^2 at the output until 2 rad/s: corners at 0.1 s and 0.2 s, on the grid of the communication.
@@ -70,6 +74,45 @@ def test_an_importer_finds_the_trajectory_of_the_run(fmi: int, scenario: Scenari
     about = {variable.name: variable for variable in description.modelVariables}
     assert about["output_torque"].unit == "N m"
     assert about["commanded_angle"].description == "commanded angle, at the output"
+
+
+def inputs(one: Scenario, whole: Recording) -> tuple[dict[str, Any], np.recarray]:
+    """What an importer hands to a scenario's joint: its choice of inputs, and their values over time.
+
+    A sampled controller is the importer's: its torque is the run's.
+    """
+    times, command, ratio = whole.time, one.command.motor, one.drive.ratio
+    values: dict[str, Any] = {"time": times}
+    choice: dict[str, Any] = {}
+    if isinstance(command, PositionCommand) and command.sample_period_s is None:
+        names = ("commanded_angle", "commanded_velocity", "commanded_acceleration")
+        values |= dict(zip(names, command.signal.data.values(times, times + 1e-9), strict=False))
+    elif isinstance(command, PositionCommand):
+        choice["motor"] = "torque"
+        # A sample at which it jumps has the torque that was held until then.
+        values["motor_torque"] = np.append(whole["motor_torque"][1:], 0.0)
+    for motion in one.command.motions(ratio):
+        names = tuple(f"prescribed_{motion.axis}_{what}" for what in ("angle", "velocity", "acceleration"))
+        values |= dict(zip(names, motion.signal.values(times, times + 1e-9), strict=False))
+    if one.load.torque is not None:
+        # Held over a step: that of its middle.
+        values["load_torque"] = one.load.torque.data.values(times + STEP / 2)[0]
+    return choice, np.rec.fromarrays(list(values.values()), names=list(values))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_every_shipped_scenario_has_its_torque(path: Path, tmp_path: Path) -> None:
+    one = loaded(path)
+    if (sampled := getattr(one.command.motor, "sample_period_s", None)) is not None:
+        one = one.with_({"run.sample_rate_hz": 1 / sampled})
+    whole = simulate(one)
+    choice, signals = inputs(one, whole)
+    out = export_fmu(one, tmp_path / "joint.fmu", **choice)
+    step = float(whole.time[1])
+    options = {"stop_time": whole.time[-1], "step_size": step, "output_interval": step, "input": signals}
+    found = fmpy.simulate_fmu(str(out), **options)
+    assert deviation(found["output_torque"], whole["output_torque"]) < 0.05
 
 
 @pytest.mark.slow

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import hdsim
 from hdsim.errors import InputError
 from hdsim.scenario import Scenario
 from hdsim.simulation.run import RunFailed
@@ -181,3 +183,18 @@ def test_a_step_that_fails_leaves_the_plant_at_its_begin() -> None:
         plant.step(1.0, {"motor_torque": 1e4})
     assert (plant.time_s, plant.values()["motor_angle"]) == (STEP, before["motor_angle"])
     plant.step(STEP, {"motor_torque": 0.0})
+
+
+def test_an_arm_hangs_on_the_output_of_a_stepped_joint_too() -> None:
+    one = hdsim.load_scenario(Path(__file__).parents[2] / "scenarios" / "arms" / "joint_2.yaml")
+    one = one.with_({"run.duration_s": 0.05, "run.sample_rate_hz": 1000})
+    whole = simulate(one)
+    command = one.command.motor.signal.data.values(whole.time, whole.time + 1e-9)  # type: ignore[union-attr]
+    plant = SteppedPlant(one)
+    found = [plant.values()["output_torque"]]
+    for k in range(len(whole.time) - 1):
+        names = ("commanded_angle", "commanded_velocity", "commanded_acceleration")
+        plant.step(STEP, dict(zip(names, command[:3, k].tolist(), strict=True)))
+        found.append(plant.values()["output_torque"])
+    assert np.abs(whole["output_torque"]).max() > 50.0
+    assert np.linalg.norm(found - whole["output_torque"]) < 0.01 * np.linalg.norm(whole["output_torque"])

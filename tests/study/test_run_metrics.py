@@ -53,6 +53,111 @@ def test_numbers_have_units_and_are_taken_when_asked_for(run, monkeypatch):
     assert numbers["output_torque_max"] is torque
 
 
+def planned(**sections) -> Scenario:
+    """A lumped drive that starts from rest, on a thousand samples a second."""
+    drive = {"preset": "csg-17-80", "mesh": {"model": "lumped"}}
+    run = {"duration_s": 0.3, "sample_rate_hz": 1000}
+    plain = {"command": {"motor": {"type": "free"}}, "load": {"inertia_kg_m2": 0.01}}
+    return Scenario.model_validate({"drive": drive, "run": run} | plain | sections)
+
+
+RAMP = {"type": "ramp", "rate_nm_per_s": 0.2}
+ARM = {"mass_kg": 1.0, "centre_of_mass_m": 0.1}
+SPEED = {"motor": {"type": "motion", "trajectory": {"type": "ramp", "velocity_rpm": 600}}}
+
+
+@pytest.mark.parametrize(
+    ("sections", "shown", "absent"),
+    [
+        pytest.param(
+            {"command": {"motor": {"type": "torque", "torque": RAMP}}},
+            ["starting_torque"],
+            {"back_driving_torque": "motor_torque to be zero until then"},
+            id="slow torque of the motor",
+        ),
+        pytest.param(
+            {"load": {"inertia_kg_m2": 0.01, "torque": RAMP | {"rate_nm_per_s": 40.0}}},
+            ["back_driving_torque"],
+            {"starting_torque": "load_torque to be zero until then"},
+            id="slow torque on the output",
+        ),
+        pytest.param(
+            {"command": {"motor": {"type": "torque", "torque": {"type": "hold", "torque_nm": 0.3}}}},
+            [],
+            {"starting_torque": "grows slowly", "back_driving_torque": "motor_torque to be zero"},
+            id="torque that jumps",
+        ),
+        pytest.param(
+            {
+                "command": SPEED,
+                "run": {"duration_s": 0.3, "start": {"motor_velocity_rad_per_s": 62.83185307}},
+            },
+            ["running_torque"],
+            {
+                "starting_torque": "turns from the beginning",
+                "limit_cycle_amplitude": "needs a commanded angle",
+            },
+            id="constant speed",
+        ),
+        pytest.param(
+            {
+                "command": SPEED,
+                "load": {"inertia_kg_m2": 0.02, "gravity": ARM},
+                "run": {"duration_s": 0.3, "start": {"motor_velocity_rad_per_s": 62.83185307}},
+            },
+            ["output_torque_max"],
+            {"running_torque": "an arm hangs on it", "efficiency": "an arm hangs on it"},
+            id="constant speed under an arm",
+        ),
+        pytest.param(
+            {
+                "command": {"motor": {"type": "locked"}},
+                "load": {
+                    "inertia_kg_m2": 0.5,
+                    "torque": {"type": "sine", "amplitude_nm": 20, "frequency_hz": 15},
+                },
+            },
+            ["output_torque_max"],
+            {
+                "hysteresis_loss": "changes slowly",
+                "backlash": "changes slowly",
+                "stiffness_k1": "changes slowly",
+                "torsional_heat_per_cycle": "changes slowly",
+                "average_load_torque": "here it stands",
+            },
+            id="locked and shaken",
+        ),
+        pytest.param(
+            {
+                "command": {"motor": {"type": "locked"}},
+                "load": {
+                    "inertia_kg_m2": 0.01,
+                    "torque": {"type": "sine", "amplitude_nm": 5, "frequency_hz": 5, "offset_nm": 20},
+                },
+            },
+            ["output_torque_max"],
+            {"hysteresis_loss": "does not come back", "lost_motion": "does not come back"},
+            id="locked and loaded one way",
+        ),
+    ],
+)
+def test_a_number_is_there_only_where_the_run_is_its_test(sections, shown, absent):
+    numbers = hdsim.simulate(planned(**sections)).metrics()
+    for name in shown:
+        assert numbers[name].value > 0.0
+    for name, why in absent.items():
+        with pytest.raises(InputError, match=why):
+            numbers[name]
+
+
+def test_a_command_that_never_rests_has_no_swing_at_rest():
+    sine = {"type": "sine", "amplitude_deg": 5, "frequency_hz": 4}
+    servo = DATA["command"]["motor"] | {"trajectory": sine}
+    numbers = hdsim.simulate(planned(command={"motor": servo})).metrics()
+    with pytest.raises(InputError, match="needs a command that rests"):
+        numbers["limit_cycle_amplitude"]
+
+
 def test_what_the_run_does_not_show_is_not_in_the_mapping(run):
     numbers = run.metrics()
     assert "lost_motion" not in numbers

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 #: Speed beyond which a motor shaft counts as turning: 0.01 rad/s, and as a multiple of the smoothing speed of
 #: its friction's sign.
 _TURNING_RAD_PER_S, _TURNING = 0.01, 6.0
+#: Growth within a sample, as a share, up to which a torque at the start of motion is that of friction.
+_SLOW = 0.05
 
 _MANUAL = "Harmonic Drive AG, engineering data: no-load starting, back-driving and running torque, efficiency"
 
@@ -29,6 +31,38 @@ _MANUAL = "Harmonic Drive AG, engineering data: no-load starting, back-driving a
 def turning_speed(scenario: Scenario) -> float:
     """Motor speed beyond which the shaft counts as turning, rad/s."""
     return max(_TURNING_RAD_PER_S, _TURNING * scenario.drive.friction.smoothing_velocity_rad_per_s)
+
+
+def _at_start(recording: Recording, scenario: Scenario, driving: str, idle: str) -> float:
+    """Size of the torque ``driving`` at which the motor begins to turn, the torque ``idle`` being zero, N m.
+
+    It grows slowly from zero: by what it grows within a sample it may be too large.
+
+    Raises:
+        InputError: the motor does not turn, turns from the beginning, or not by that torque alone.
+    """
+    first = _starts(recording, scenario)
+    _without_gravity(scenario, "a torque at the start of motion needs")
+    other = float(np.max(np.abs(recording[idle][: first + 1])))
+    if other > 0.0:
+        raise InputError(
+            f"a torque at the start of motion needs {idle} to be zero until then; here it is up to "
+            f"{other:.3g} N m"
+        )
+    size = np.abs(recording[driving][: first + 1])
+    growth = float(np.max(np.abs(np.diff(size, prepend=0.0))))
+    if not growth <= _SLOW * size[-1] or size[-1] == 0.0:
+        raise InputError(
+            f"a torque at the start of motion needs a {driving} that grows slowly from zero; here it changes "
+            f"by up to {growth:.3g} N m within a sample, and is {size[-1]:.3g} N m then"
+        )
+    return float(size[-1])
+
+
+def _without_gravity(scenario: Scenario, needs: str) -> None:
+    """Refuse an output that gravity loads: the load torque does not hold it."""
+    if scenario.load.gravity is not None or scenario.load.arm is not None:
+        raise InputError(f"{needs} an output without gravity; here an arm hangs on it")
 
 
 def _starts(recording: Recording, scenario: Scenario) -> int:
@@ -49,13 +83,13 @@ def _starts(recording: Recording, scenario: Scenario) -> int:
 @metric("starting_torque", "N m", "motor torque at which the unloaded drive starts to turn", _MANUAL)
 def starting_torque(recording: Recording, scenario: Scenario) -> float:
     """Motor torque at the start of motion, N m."""
-    return float(abs(recording["motor_torque"][_starts(recording, scenario)]))
+    return _at_start(recording, scenario, "motor_torque", "load_torque")
 
 
 @metric("back_driving_torque", "N m", "output torque at which the drive is turned from the output", _MANUAL)
 def back_driving_torque(recording: Recording, scenario: Scenario) -> float:
-    """Load torque at the start of motion, N m."""
-    return float(abs(recording["load_torque"][_starts(recording, scenario)]))
+    """Load torque at the start of motion, motor free, N m."""
+    return _at_start(recording, scenario, "load_torque", "motor_torque")
 
 
 @dataclass(frozen=True)
@@ -84,6 +118,16 @@ class OperatingPoints:
         )
         table[rows, columns] = values
         return speeds, loads, table
+
+
+def _points(recording: Recording, scenario: Scenario) -> OperatingPoints:
+    """Plateaus whose load is the load torque alone.
+
+    Raises:
+        InputError: the run has none, or gravity loads the output.
+    """
+    _without_gravity(scenario, "running torque and efficiency need")
+    return operating_points(recording)
 
 
 def operating_points(recording: Recording) -> OperatingPoints:
@@ -121,7 +165,7 @@ def operating_points(recording: Recording) -> OperatingPoints:
 @metric("running_torque", "N m", "mean motor torque without load, at the fastest plateau of the run", _MANUAL)
 def running_torque(recording: Recording, scenario: Scenario) -> float:
     """Mean motor torque at the fastest plateau without load, N m."""
-    points = operating_points(recording)
+    points = _points(recording, scenario)
     unloaded = np.flatnonzero(np.abs(points.load) < 1e-9)
     if not len(unloaded):
         raise InputError("a no-load running torque needs a plateau of constant speed without load torque")
@@ -131,7 +175,7 @@ def running_torque(recording: Recording, scenario: Scenario) -> float:
 @metric("efficiency", "1", "work out over work in, at the plateau with the largest load and speed", _MANUAL)
 def efficiency(recording: Recording, scenario: Scenario) -> float:
     """Efficiency at the plateau of largest power delivered; driving counts before back-driving."""
-    points = operating_points(recording)
+    points = _points(recording, scenario)
     loaded = np.flatnonzero(np.isfinite(points.efficiency))
     if not len(loaded):
         raise InputError("efficiency needs a plateau of constant speed with a load torque")

@@ -43,8 +43,11 @@ def _averages(recording: Recording) -> tuple[float, float]:
 
 @metric("average_load_torque", "N m", "cubic mean of the output torque, weighed by the speed", PROCEDURE)
 def average_load_torque(recording: Recording, scenario: Scenario) -> float:
-    """Cubic mean of the transmitted torque over the run, N m; 0 where nothing turns."""
-    return _averages(recording)[0]
+    """Cubic mean of the transmitted torque over the run, N m."""
+    torque, speed = _averages(recording)
+    if speed == 0.0:
+        raise InputError("a mean weighed by the speed needs a motor that turns; here it stands")
+    return torque
 
 
 @metric("average_input_speed", "rpm", "mean of the wave generator's absolute speed over the run", PROCEDURE)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hdsim.errors import InputError
 from hdsim.recording import Recording
 from hdsim.simulation.limit_cycle import LimitCycle, limit_cycle
 from hdsim.studies.metrics._spans import ARCSEC, Dwell, dwells, rests
@@ -79,10 +80,13 @@ def largest_limit_cycle(recording: Recording) -> LimitCycle | None:
     """The limit cycle with the largest amplitude among the run's rests; None where none swings.
 
     Raises:
-        InputError: the run has no commanded angle.
+        InputError: the run has no commanded angle, or it never rests.
     """
     time, angle = recording.time, recording["output_angle"]
-    found = [limit_cycle(time[r.samples], angle[r.samples] - r.target) for r in rests(recording)]
+    resting = rests(recording)
+    if not resting:
+        raise InputError("a limit cycle at rest needs a command that rests; the commanded angle never does")
+    found = [limit_cycle(time[r.samples], angle[r.samples] - r.target) for r in resting]
     return max((one for one in found if one), key=lambda one: one.amplitude_rad, default=None)
 
 
@@ -147,11 +151,13 @@ def limit_cycle_amplitude(recording: Recording, scenario: Scenario) -> float:
     return 0.0 if found is None else ARCSEC * found.amplitude_rad
 
 
-@metric("limit_cycle_frequency", "Hz", "frequency of the largest swing at rest; 0: it rests", _CYCLE)
+@metric("limit_cycle_frequency", "Hz", "frequency of the largest swing at rest", _CYCLE)
 def limit_cycle_frequency(recording: Recording, scenario: Scenario) -> float:
-    """Frequency of the largest limit cycle, Hz; 0 without one."""
+    """Frequency of the largest limit cycle, Hz."""
     found = largest_limit_cycle(recording)
-    return 0.0 if found is None else found.frequency_hz
+    if found is None:
+        raise InputError("the frequency of a limit cycle needs one; the output comes to rest")
+    return found.frequency_hz
 
 
 @metric("tracking_error_rms", "arcsec", "root mean square of the tracking error over the run", _TRACKING)

@@ -24,6 +24,8 @@ _LOST = "angle between the points of the loop's centre line at plus and minus a 
 
 #: Shares of rated torque between which the lines that are extended to zero torque are fitted.
 _BACKLASH_FIT = (0.01, 0.03)
+#: Share of the cycle's torque that may accelerate the load: the bench's own cycle stays below 0.1 %.
+_INERTIAL = 0.02
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,8 @@ def torsion_loop(recording: Recording) -> TorsionLoop:
     span = float(np.ptp(torque))
     top = np.flatnonzero(torque >= np.max(torque) - 1e-3 * span)
     bottom = np.flatnonzero(torque <= np.min(torque) + 1e-3 * span)
-    if span == 0.0 or bottom[0] > top[-1] or top[0] > bottom[-1]:
+    both = torque.min() < 0.0 < torque.max()
+    if not both or bottom[0] > top[-1] or top[0] > bottom[-1]:
         raise InputError(
             "a torsion cycle needs the load torque to go 0, +T, 0, -T, 0, +T; here it does not come back"
         )
@@ -138,6 +141,24 @@ def _monotone(torque: Array, angle: Array) -> tuple[Array, Array]:
     return torque[kept], angle[kept]
 
 
+def slow_loop(recording: Recording, scenario: Scenario) -> TorsionLoop:
+    """The loop of a load torque that winds the drive and does not accelerate what hangs on it.
+
+    Raises:
+        InputError: as ``torsion_loop``; or more than ``_INERTIAL`` of the torque goes to the load's inertia.
+    """
+    loop = torsion_loop(recording)
+    accelerated = scenario.load.over(0.0)[1] * np.gradient(recording["output_velocity"], recording.time)
+    # Seldom ones are those of a passage through play.
+    usual = float(np.quantile(np.abs(accelerated), 0.99))
+    if usual > _INERTIAL * loop.peak:
+        raise InputError(
+            "a torsion cycle needs a load torque that changes slowly; here "
+            f"{usual:.3g} of {loop.peak:.3g} N m accelerate the load"
+        )
+    return loop
+
+
 def _corners(loop: TorsionLoop, scenario: Scenario) -> tuple[float, ...]:
     torsion = scenario.drive.torsion
     return (torsion.torque_t1_nm, torsion.torque_t2_nm, loop.peak)
@@ -146,7 +167,7 @@ def _corners(loop: TorsionLoop, scenario: Scenario) -> tuple[float, ...]:
 def _stiffness_metric(k: int, of: str) -> None:
     @metric(f"stiffness_k{k}", "N m/rad", f"torsional stiffness, secant {of}, motor locked", _CHA)
     def stiffness(recording: Recording, scenario: Scenario) -> float:
-        loop = torsion_loop(recording)
+        loop = slow_loop(recording, scenario)
         corners = _corners(loop, scenario)[:k]
         if k == 3 and corners[2] < 1.02 * corners[1]:
             raise InputError(
@@ -162,12 +183,12 @@ for _k, _of in ((1, "from 0 to T1"), (2, "from T1 to T2"), (3, "from T2 to the e
 @metric("hysteresis_loss", "arcsec", "width of the torsion cycle at zero torque, play included", _LOSS)
 def hysteresis_loss(recording: Recording, scenario: Scenario) -> float:
     """Angle between the branches at zero torque, arcsec."""
-    return ARCSEC * torsion_loop(recording).hysteresis_loss
+    return ARCSEC * slow_loop(recording, scenario).hysteresis_loss
 
 
 def lost_motion_at(recording: Recording, scenario: Scenario, share: float) -> float:
     """Lost motion at plus and minus a share of the rated torque, arcsec."""
-    return ARCSEC * torsion_loop(recording).lost_motion(share * scenario.drive.rated_torque_nm)
+    return ARCSEC * slow_loop(recording, scenario).lost_motion(share * scenario.drive.rated_torque_nm)
 
 
 @metric("lost_motion", "arcsec", "lost motion at +-3 % of rated torque", f"{_LOST}: 3 % (Nabtesco, Spinea)")
@@ -196,7 +217,7 @@ def lost_motion_4_percent(recording: Recording, scenario: Scenario) -> float:
 def backlash(recording: Recording, scenario: Scenario) -> float:
     """Play, arcsec."""
     rated = scenario.drive.rated_torque_nm
-    return ARCSEC * torsion_loop(recording).backlash(*(share * rated for share in _BACKLASH_FIT))
+    return ARCSEC * slow_loop(recording, scenario).backlash(*(share * rated for share in _BACKLASH_FIT))
 
 
 @metric(
@@ -207,5 +228,5 @@ def backlash(recording: Recording, scenario: Scenario) -> float:
 )
 def torsional_heat_per_cycle(recording: Recording, scenario: Scenario) -> float:
     """Area of the loop, J."""
-    loop = torsion_loop(recording)
+    loop = slow_loop(recording, scenario)
     return float(np.trapezoid(loop.falling - loop.rising, loop.torque))
