@@ -26,7 +26,7 @@ from hdsim.estimate.state import Added, State
 from hdsim.estimate.vector import Vector, sensitivities
 
 #: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
-#: be fitted further, and from the numbers as given.
+#: be fitted further, and from the numbers as given or from where another led.
 ROUGH, FULL, LEFT_IN, FAR_LEFT_IN = 5, 12, 2.0, 3.0
 #: Most candidates that are.
 FAR_MOST = 3
@@ -166,6 +166,8 @@ def _after_the_best(
         return
     name = min((one.name for one in series if one.name in best), key=lambda name: best[name][0])
     loss, leader = best[name]
+    if loss > FAR_LEFT_IN * min(least for least, _ in best.values()):
+        return  # what is missing is none of them
     enough = (1.0 + LAGS) * max(loss, sum(bench.noise_powers.values()))
     rivals = [one for one in series if best.get(one.name, (math.inf, None))[0] > enough]
     if not rivals:
