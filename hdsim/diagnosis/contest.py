@@ -26,7 +26,7 @@ from hdsim.estimate.state import Added, State
 from hdsim.estimate.vector import Vector, sensitivities
 
 #: Evaluations of a rough and of a full fit; what a rough one may leave, in units of what the best leaves, to
-#: be fitted further, and from the numbers as given.
+#: be fitted further, and from the numbers as given or from where another led.
 ROUGH, FULL, LEFT_IN, FAR_LEFT_IN = 5, 12, 2.0, 3.0
 #: Most candidates that are.
 FAR_MOST = 3
@@ -40,6 +40,9 @@ SOFTEST = 0.85
 LAGS = 0.1
 #: Part of the screen's coefficient at which a compliance's fit, or one that led astray, begins a second time.
 SMALL = 0.2
+
+#: Candidates that were fitted, by name, each with whether it was fitted to the end.
+Fitted = dict[str, tuple[Fit, bool]]
 
 
 @dataclass
@@ -80,14 +83,27 @@ def contest(
     shortlist: Sequence[Screened],
     residual: Residual,
     on_step: Callable[[str], object] | None,
+    fitted: Fitted | None = None,
 ) -> list[tuple[str, Fit, Array]]:
     """Fit every candidate roughly, and the best of them further; each with what it leaves by blocks.
 
     Where the re-fit went far the candidates are fitted from the numbers as given too: a base without the
     effect may have bent them to stand in for it.
+
+    Args:
+        bench: the measured series.
+        base: the fitted model without the effect.
+        shortlist: the candidates.
+        residual: what they were screened on.
+        on_step: told what is being fitted.
+        fitted: candidates of an earlier contest over the same base, which need not be fitted again; those of
+            this one are added.
     """
     tell = on_step or (lambda _: None)
-    best: dict[str, tuple[float, Fit]] = {}
+    known = fitted if fitted is not None else {}
+    names = [one.name for one in shortlist]
+    best = {n: (bench.power(found.predictions), found) for n, (found, _) in known.items() if n in names}
+    shortlist = [one for one in shortlist if one.name not in best]
 
     def keep(name: str, several: list[Fit]) -> None:
         for each in several:
@@ -124,9 +140,12 @@ def contest(
     _after_the_best(bench, base, shortlist, best, keep, tell)
     least = min(loss for loss, _ in best.values())
     for name, (loss, found) in list(best.items()):
-        if loss <= LEFT_IN * least:
+        full = name in known and known[name][1]
+        if loss <= LEFT_IN * least and not full:
             tell(f"fitting {name} in full")
             keep(name, _fully(bench, base, found))
+            full = True
+        known[name] = best[name][1], full
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
 
 
@@ -147,6 +166,8 @@ def _after_the_best(
         return
     name = min((one.name for one in series if one.name in best), key=lambda name: best[name][0])
     loss, leader = best[name]
+    if loss > FAR_LEFT_IN * min(least for least, _ in best.values()):
+        return  # what is missing is none of them
     enough = (1.0 + LAGS) * max(loss, sum(bench.noise_powers.values()))
     rivals = [one for one in series if best.get(one.name, (math.inf, None))[0] > enough]
     if not rivals:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnosis.contest import against_priors, contest
+from hdsim.diagnosis.contest import Fitted, against_priors, contest
 from hdsim.diagnosis.evidence import CandidateEvidence
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, Screening
@@ -93,6 +93,7 @@ def name_effect(
     *,
     coordinate: str = "",
     on_step: Callable[[str], object] | None = None,
+    fitted: Fitted | None = None,
 ) -> Named | None:
     """Fit the screen's best in the simulated model and keep the best of them.
 
@@ -103,6 +104,8 @@ def name_effect(
         residual: what it was screened on.
         coordinate: the one that explains most of it; effects that live there are fitted more readily.
         on_step: told what is being fitted.
+        fitted: the base with each effect that was fitted for another residual of it; those of this one are
+            added.
     """
     best = screening.ranked[0]
     known = catalogue()
@@ -121,7 +124,7 @@ def name_effect(
         # The re-fit may have taken any compliance in series for the drive's own.
         shortlist += [one for one in series if one not in shortlist]
     with bench.coarse():
-        results = contest(bench, base, shortlist, residual, on_step)
+        results = contest(bench, base, shortlist, residual, on_step, fitted)
     if not results:
         return None
     *results, (_, _, before) = against_priors(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hdsim.diagnosis.contest import Fitted
 from hdsim.diagnosis.late import read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, SAME, Named, name_effect
@@ -132,9 +133,10 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     if found.named and not (stage.location.sharp(LEVEL) or _more_could(bench, base, current)):
         return None
-    named = _one_more(bench, base, current, found, stage, bool(found.named), during)
+    fitted: Fitted = {}
+    named = _one_more(bench, base, current, found, stage, bool(found.named), during, fitted)
     if found.named and (named is None or named.of_left < MOST):
-        within = _one_more(bench, base, current, found, stage, False, during)
+        within = _one_more(bench, base, current, found, stage, False, during, fitted)
         # No formula errs by so much that another explains most of it.
         if within is not None and (named is None or within.of_left > max(MOST, named.of_left)):
             named = within
@@ -168,6 +170,7 @@ def _one_more(
     stage: Stage,
     beyond: bool,
     during: Callable[[str, str], Step],
+    fitted: Fitted,
 ) -> Named | None:
     """The best further effect; ``beyond``: of what no curve over the present ones' coordinates explains.
 
@@ -192,7 +195,7 @@ def _one_more(
         return None
     tell = during("fit", "fitting the shortlist")
     coordinate = places[0].coordinate if places else ""
-    named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell)
+    named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell, fitted=fitted)
     if named is None:
         return None
     change = left.project(bench.trace(current.predictions, named.fit.predictions))
@@ -312,9 +315,10 @@ def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, 
         if same or stuck or now < (1.0 - SAME) * loss:
             own = named if named.name == own.name or not same or stuck else own
             if own is named:
-                # It was fitted last: back to its place.
+                # It was fitted last: back to its place; where the same law lay better, that is kept.
                 last = len(added) - 1
-                current = named.fit.ordered([*range(k), last, *range(k, last)])
+                if stuck or named.name != found.named[k].name or now < loss:
+                    current = named.fit.ordered([*range(k), last, *range(k, last)])
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0

@@ -56,6 +56,7 @@ class Screening:
         skipped: effects that could not be tried, with the reason.
         seen: traces that were simulated, whitened with ``sigmas``, by effect, way of fitting and shapes.
         sigmas: of every series when they were.
+        behind: whether a way of fitting an effect acts behind the sensor whose reading is the load.
     """
 
     ranked: list[Screened] = field(default_factory=list)
@@ -63,6 +64,7 @@ class Screening:
     skipped: dict[str, str] = field(default_factory=dict)
     seen: dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array]] = field(default_factory=dict)
     sigmas: Array = field(default_factory=lambda: np.zeros(0))
+    behind: dict[tuple[str, str], bool] = field(default_factory=dict)
 
 
 def screen(
@@ -88,6 +90,7 @@ def screen(
         on_step: told what is being tried.
     """
     found = Screening(sigmas=np.array([series.sigma for series in bench.series]))
+    found.behind = dict(before.behind) if before is not None else {}
     shares: list[Share] = []
     present = set(state.effects) | {added.effect for added in state.added}
     tried: list[Added] = []
@@ -116,7 +119,11 @@ def screen(
                 continue
             if (name, fitting.label) in {(added.effect, added.fitting.label) for added in state.added}:
                 continue
-            if behind_sensor(bench, state, name, fitting, ranges):
+            way = name, fitting.label
+            # Where an effect acts is what its formula says, whatever else the model has by now.
+            if way not in found.behind:
+                found.behind[way] = behind_sensor(bench, state, name, fitting, ranges)
+            if found.behind[way]:
                 found.skipped[name] = (
                     "acts on the load's side of the torque sensor, whose reading is the load"
                 )

@@ -289,6 +289,20 @@ class Bench:
                 found[series.channel] += float(np.sum((residual[series.train] / series.sigma) ** 2))
         return found
 
+    def beyond_noise(self, predictions: Sequence[Array]) -> dict[str, float]:
+        """Mean square of each channel's training residual beyond its noise, SI units, 0 or more."""
+        found = {}
+        for channel in self.channels:
+            own = [
+                (s, rest[s.train])
+                for s, rest in zip(self.series, self.residuals(predictions), strict=True)
+                if s.channel == channel and len(rest)
+            ]
+            count = sum(len(rest) for _, rest in own)
+            power = sum(float(rest @ rest) - len(rest) * s.noise**2 for s, rest in own)
+            found[channel] = max(power, 0.0) / max(count, 1)
+        return found
+
     def weigh(self, residuals: Sequence[Array]) -> None:
         """Set every series' ``sigma`` from its noise and from what is left of its channel in training data.
 

@@ -75,14 +75,31 @@ def minimised(
                 rest = slopes.rest[x.tobytes()] = problem.residual(x)
             except ArithmeticError:
                 rest = 10.0 * start
-        return np.concatenate([worth * rest, (x - centre) / priors])
+        return rest
+
+    def whole(x: Array, columns: Array) -> Array:
+        """Derivatives and, last, values of all that is minimised, in p + 1 rows of the same products."""
+        both = np.column_stack([-worth * columns, worth * residual(x)])
+        beliefs = np.column_stack([np.diag(1.0 / priors), (x - centre) / priors])
+        return np.asarray(np.linalg.qr(np.vstack([both, beliefs]), mode="r"))
+
+    def length(x: Array) -> float:
+        return math.hypot(
+            worth * float(np.linalg.norm(residual(x))), float(np.linalg.norm((x - centre) / priors))
+        )
+
+    # The optimiser sees the long residual by its products alone: turned so that it is its length in the last
+    # row, it is known before the derivatives are.
+    def values(x: Array) -> Array:
+        return np.append(np.zeros(len(x)), length(x))
 
     def jacobian(x: Array) -> Array:
-        return np.vstack([-worth * slopes.at(x), np.diag(1.0 / priors)])
+        small = whole(x, slopes.at(x))
+        return _turned(small[:, :-1], small[:, -1])
 
     for _ in range(1 if rough else rounds):
         found = least_squares(
-            residual,
+            values,
             x0,
             jac=jacobian,
             bounds=problem.bounds,
@@ -98,11 +115,22 @@ def minimised(
             break
         # The end is where the exact Jacobian promises less than an independent sample of the data is worth.
         columns = slopes.proved(found.x)
-        whole = jacobian(found.x)
-        free = found.active_mask == 0
-        step, *_ = np.linalg.lstsq(whole[:, free], -found.fun, rcond=None)
-        promised = np.sum(found.fun**2) - np.sum((found.fun + whole[:, free] @ step) ** 2)
+        small = whole(found.x, columns)
+        free, rest = found.active_mask == 0, small[:, -1]
+        step, *_ = np.linalg.lstsq(small[:, :-1][:, free], -rest, rcond=None)
+        promised = np.sum(rest**2) - np.sum((rest + small[:, :-1][:, free] @ step) ** 2)
         if promised < tight:
             break
         x0 = found.x
-    return Minimum(found.x, found.fun[: len(start)] / worth, columns)
+    return Minimum(found.x, residual(found.x), columns)
+
+
+def _turned(columns: Array, values: Array) -> Array:
+    """Columns, shape (n, p), turned so that the values, (n,), would be their length in the last row alone.
+
+    A. S. Householder 1958, Journal of the ACM 5:339: the reflection that takes one vector to another.
+    """
+    mirror = values.copy()
+    mirror[-1] -= float(np.linalg.norm(values))
+    size = float(mirror @ mirror)
+    return columns if size == 0.0 else columns - np.outer(mirror, 2.0 / size * (mirror @ columns))

@@ -2,12 +2,13 @@
 
 The mean over a stretch of time commutes with everything in a drive that is linear and does not change: the
 model under the mean motion predicts the mean torques. What means lose is what is faster, so they are taken
-only as far as what they lose of the compared channels is the noise, and hardly anything beside it.
+only as far as what they lose of the compared channels is the noise, and hardly anything beside it; or hardly
+anything beside what a model leaves, once that is known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -24,6 +25,9 @@ ENOUGH = 8000
 #: be named. Noise by pairs of readings over noise by differences of high order, both squared, up to which it
 #: counts as white: the estimates differ by up to 20 % where it is, and by 70 % and more on real machines.
 OF_NOISE, WHITE = 0.03, 1.25
+#: Part of what a model leaves of a channel beyond the noise that may be lost: half of the least that one more
+#: effect must explain to be named beside those that are found (``BEYOND_GAIN`` of a search).
+OF_LEFT = 0.0025
 #: Readings of a mean that loses so little, over those of the mean that is taken: near their own limit means
 #: no longer tell the course between them.
 MARGIN = 2
@@ -61,7 +65,11 @@ def thinned(record: Record, count: int) -> Record:
 
 
 def readings_of_means(
-    records: Sequence[Record], *, load: LoadSource | None = None, locked: Locked = ""
+    records: Sequence[Record],
+    *,
+    load: LoadSource | None = None,
+    locked: Locked = "",
+    left: Mapping[str, float] | None = None,
 ) -> int:
     """How many successive readings may be made one, 1 for none, of the record that is read fastest.
 
@@ -69,7 +77,9 @@ def readings_of_means(
         records: as they were read.
         load: see ``plan_for``.
         locked: likewise.
+        left: mean square that a model leaves of each channel beyond the noise, SI units, once it is known.
     """
+    beyond = left or {}
     samples = sum(len(record.time) for record in records)
     fastest = min(record.period_s for record in records)
     found = 1
@@ -79,7 +89,7 @@ def readings_of_means(
         for record in records:
             own = over(record, MARGIN * count * fastest)
             channels = plan_for(record, load=load, locked=locked).channels
-            if own > 1 and any(not only_noise(record, channel, own) for channel in channels):
+            if own > 1 and any(not only_noise(record, c, own, beyond.get(c, 0.0)) for c in channels):
                 return found
         found = count
     return found
@@ -90,18 +100,20 @@ def over(record: Record, span_s: float) -> int:
     return max(1, int(span_s / record.period_s + 0.01))
 
 
-def only_noise(record: Record, channel: str, count: int) -> bool:
-    """Whether all that means of so many readings lose of a channel is white noise.
+def only_noise(record: Record, channel: str, count: int, left: float = 0.0) -> bool:
+    """Whether all that means of so many readings lose of a channel is white noise, or little beside the rest.
 
     Args:
         record: as it was read.
         channel: one that has readings.
         count: readings of a mean, 2 or more.
+        left: mean square that a model leaves of the channel beyond the noise.
     """
     floor = noise_floor(record.channels[channel], record.trusted[channel]) ** 2
     # Of white noise a mean takes its own share along.
     noise = float(np.clip(2.0 * _lost(record, channel, 2), floor, WHITE * floor))
-    return _lost(record, channel, count) - noise * (1.0 - 1.0 / count) <= OF_NOISE * noise
+    lost = _lost(record, channel, count) - noise * (1.0 - 1.0 / count)
+    return lost <= max(OF_NOISE * noise, OF_LEFT * left)
 
 
 def _lost(record: Record, channel: str, count: int) -> float:

@@ -41,6 +41,12 @@ def test_what_is_fast_is_not_averaged_away():
     assert readings_of_means([record(ripple=2e-3)]) <= 2
 
 
+@pytest.mark.parametrize(("left", "count"), [(1e-4, 2), (1e-3, 8)])
+def test_what_is_fast_is_averaged_away_beside_far_more_that_a_model_leaves(left, count):
+    # All of the ripple's 2e-6 may be lost beside 1e-3, of which a name must explain twice as much.
+    assert readings_of_means([record(ripple=2e-3)], left={"motor_torque": left}) == count
+
+
 def test_noise_that_is_not_white_is_not_averaged_away():
     one = record()
     slow = np.convolve(one.channels["motor_torque"], np.ones(5) / 5, mode="same")
