@@ -107,7 +107,8 @@ def _page(found: Findings, pictures: dict[str, str]) -> str:
             "Where the difference lives",
             pictures.get(
                 "located", "<p>What the re-fitted model leaves is a function of nothing measured.</p>"
-            ),
+            )
+            + sections.orders(verdict),
         ),
         _over_time(pictures),
         sections.fitted(found),
