@@ -8,6 +8,7 @@ from pydantic import Field
 
 from hdsim.diagnosis.decide import Reason
 from hdsim.diagnosis.further import CurveFound, NextExperiment
+from hdsim.diagnosis.growth import TrackedOrder
 from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part
 
 VERSION = 2
@@ -110,6 +111,8 @@ class Verdict(Part):
     """Held-out RMS residuals by channel."""
     located: list[Located] = []
     """Strongest regressors first within each stage."""
+    orders: list[TrackedOrder] = []
+    """The located orders over speed: which grow with it, and their amplitudes in each record."""
     data_problems: list[DataProblem] = []
     """What the data check found."""
     not_tried: dict[str, str] = {}

@@ -12,6 +12,7 @@ from hdsim.diagnosis.collect import collect
 from hdsim.diagnosis.curve import CurveFit, fit_curve
 from hdsim.diagnosis.decide import Decision, decide
 from hdsim.diagnosis.evidence import Evidence
+from hdsim.diagnosis.growth import tracked
 from hdsim.diagnosis.locate import SHARP
 from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.remainder import remainder
@@ -191,6 +192,8 @@ def _diagnosed(
     if current is not found.fit:
         with step("prove", "validating on held-out data"):
             gap, predictions = gaps(bench, states | {"after": current.state})
+    with step("orders", "tracking orders over speed"):
+        orders = tracked(bench, current.state, [stage.location for stage in found.stages])
     with step("prove", "validating on held-out data"):
         gap = with_baselines(bench, start, gap, black_box=black_box)
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
@@ -210,6 +213,7 @@ def _diagnosed(
         "moved": [i.name for i in off],
         "gap": gap,
         "located": _located(found.stages),
+        "orders": orders,
         "data_problems": [DataProblem(**vars(problem)) for problem in problems],
         "not_tried": found.stages[0].screening.skipped if found.stages[0].screening else {},
         "confidence": decision.certainty,

@@ -106,7 +106,8 @@ def _page(found: Findings, pictures: dict[str, str]) -> str:
             "What the residual depends on",
             pictures.get(
                 "located", "<p>The residual of the re-fitted model depends on nothing that was measured.</p>"
-            ),
+            )
+            + sections.orders(verdict),
         ),
         _over_time(pictures),
         sections.fitted(found),

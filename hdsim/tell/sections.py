@@ -36,6 +36,18 @@ def confusions(verdict: Verdict) -> str:
     return section(title, body, "warn") if body else ""
 
 
+def orders(verdict: Verdict) -> str:
+    """The located orders over speed."""
+    listed = "".join(f"<li>{html.escape(started(one.sentence))}.</li>" for one in verdict.orders)
+    if not listed:
+        return ""
+    note = (
+        "<p class='note'>Amplitudes are means over periods of the order, in bands of speed of each record; "
+        "the power of the speed with which they go has its 95 % interval.</p>"
+    )
+    return f"<p>Orders per turn of the wave generator over speed:</p><ul>{listed}</ul>{note}"
+
+
 def following(verdict: Verdict) -> str:
     """The next experiment."""
     proposal = verdict.next_experiment
