@@ -55,7 +55,7 @@ def scenario_examples() -> list[Any]:
 
 def test_every_page_is_in_the_index() -> None:
     linked = {(DOCS / link).resolve() for link in links(DOCS / "README.md")}
-    itself = {DOCS / f"{name}.md" for name in ("README", "index", "about")}  # the site's, which include READMEs
+    itself = {DOCS / f"{name}.md" for name in ("README", "index", "about")}  # they include READMEs
     assert set(DOCS.glob("**/*.md")) - itself - linked == set()
 
 
