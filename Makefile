@@ -62,7 +62,7 @@ blind: $(STAMP)
 	$(BIN)/python tests/blind page
 
 site: $(STAMP)
-	$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doctrees docs build/site
+	$(BIN)/python -m sphinx -q -E -W --keep-going -b html -d build/doctrees docs build/site
 	@echo "the pages are in build/site/index.html"
 
 picture: run

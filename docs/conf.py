@@ -61,6 +61,7 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
 }
 
+smartquotes = False  # a prime of an equation is no quotation mark
 html_theme = "furo"
 html_title = "hdsim"
 html_static_path = ["_static"]

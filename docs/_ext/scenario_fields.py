@@ -100,16 +100,16 @@ def page() -> str:
 
     whole = Scenario.model_json_schema(ref_template="{model}")
     models = whole["$defs"]
-    lines: list[str] = []
+    lines = [*table(whole), ""]
     shown: set[str] = set()
     for section, entry in whole["properties"].items():
+        waiting = list(mentioned(entry))
+        if not waiting:
+            continue
         lines += [f"## {section}", "", plain(entry.get("description", "")), ""]
         if section in ELSEWHERE:
             lines += [f"One section for each effect: {ELSEWHERE[section]}.", ""]
             continue
-        waiting = list(mentioned(entry))
-        if not waiting:
-            lines += [f"{allowed(entry)}; default: {default(section, whole)}", ""]
         while waiting:
             name = waiting.pop(0)
             if name in shown:

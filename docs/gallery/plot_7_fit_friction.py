@@ -36,7 +36,7 @@ measured["motor_torque"][:] += np.random.default_rng(0).normal(0.0, 2e-3, measur
 found = hdsim.fit(measured, model, free=FREE)
 for one in found.intervals:
     told = f"{one.value:.3g}, 95 %: {one.low:.3g} to {one.high:.3g}" if one.determined else "not determined"
-    print(f"{one.name} [{one.unit}]: {told}; true: {truth[one.name]:.3g}")
+    print(f"{one.name} [{one.unit or '1'}]: {told}; true: {truth[one.name]:.3g}")
 
 # %%
 # The torque over the speed: measured, of the model, and of the model with what was found.

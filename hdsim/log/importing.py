@@ -54,9 +54,9 @@ def import_recording(
         tell: hears which share of the file has been read.
 
     Returns:
-        A recording whose ``state`` holds what was measured: ``motor_angle``, ``motor_velocity``,
-        ``motor_torque``, ``output_angle``, ``output_velocity``, ``output_torque``, ``load_torque``,
-        ``temperature``, as far as mapped; ``transmission_error`` where both angles and the ratio are known.
+        A recording whose ``state`` holds, as far as mapped, ``motor_angle``, ``motor_velocity``,
+        ``motor_torque``, ``output_angle``, ``output_velocity``, ``output_torque``, ``load_torque`` and
+        ``temperature``; ``transmission_error`` where both angles and the ratio are known.
         Masked numbers are NaN. Time counts from the first sample. The metadata hold the source, its SHA-256,
         the mapping, the ratio, and under ``gaps`` the gaps as JSON, [[start, end], ...] in s.
 

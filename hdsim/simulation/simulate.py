@@ -44,7 +44,7 @@ def simulate(
             then how the channel changes with the number (``hdsim.simulation.sensitivities``).
 
     Returns:
-        The recording: tables ``state`` and ``teeth``, static arrays, events and provenance.
+        The recording, with tables ``state`` and ``teeth``, static arrays, events and provenance.
 
     Raises:
         RunFailed: the run stopped early; its ``recording`` holds what was computed.

@@ -43,9 +43,7 @@ class Page(HTMLParser):
             self.loads.add(given["href"])
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("site")
+def built(place: Path) -> Path:
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
     command += ["-d", str(place / "doctrees"), str(DOCS), str(place / "html")]
     # A proxy that is not there: whatever asks the network fails.
@@ -55,55 +53,50 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place / "html"
 
 
-@pytest.fixture(scope="module")
-def pages(site: Path) -> dict[Path, Page]:
-    return {path: Page(path.read_text(encoding="utf-8")) for path in sorted(site.rglob("*.html"))}
-
-
-@pytest.mark.slow
-def test_every_link_leads_somewhere(site: Path, pages: dict[Path, Page]) -> None:
-    wrong = []
+def dead_links(site: Path, pages: dict[Path, Page]) -> list[str]:
+    dead = []
     for path, page in pages.items():
         for link in sorted(page.links | page.loads):
-            parts = urlsplit(link)
-            if parts.scheme:
+            split = urlsplit(link)
+            if split.scheme:
                 continue
-            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
-            found = target.exists() and target.is_relative_to(site.resolve())
-            if found and target.suffix == ".html" and parts.fragment:
-                found = unquote(parts.fragment) in pages[target].names
-            if not found:
-                wrong.append(f"{path.relative_to(site)}: {link}")
-    assert wrong == []
+            target = (path.parent / unquote(split.path)).resolve() if split.path else path
+            alive = target.exists() and target.is_relative_to(site)
+            if alive and target.suffix == ".html" and split.fragment:
+                alive = unquote(split.fragment) in pages[target].names
+            if not alive:
+                dead.append(f"{path.relative_to(site)}: {link}")
+    return dead
 
 
 @pytest.mark.slow
-def test_nothing_is_loaded_from_elsewhere(site: Path, pages: dict[Path, Page]) -> None:
+def test_the_site_is_whole(tmp_path: Path) -> None:
+    site = built(tmp_path.resolve())  # once, so that it is one test
+    texts = {path: path.read_text(encoding="utf-8") for path in sorted(site.rglob("*.html"))}
+    pages = {path: Page(text) for path, text in texts.items()}
+    assert dead_links(site, pages) == []
+    # Nothing is loaded from elsewhere: formulas are MathML, styles and scripts lie beside the pages.
     assert {load for page in pages.values() for load in page.loads if urlsplit(load).scheme} == set()
     styles = "".join(path.read_text(encoding="utf-8") for path in site.rglob("*.css"))
     assert re.findall(r"(?:url\(|@import )['\"]?(?:https?:)?//[^)'\"]*", styles) == []
-
-
-@pytest.mark.slow
-def test_the_reference_has_the_public_face(pages: dict[Path, Page], site: Path) -> None:
+    assert "<math" in texts[site / "generated" / "gallery" / "plot_7_fit_friction.html"]
+    # The reference has the public face.
     assert {f"hdsim.{name}" for name in hdsim.__all__} <= pages[site / "reference" / "api.html"].names
     commands = pages[site / "reference" / "command-line.html"].names
     assert {f"hdsim-{name}" for name in COMMANDS} <= commands
-    fields = (site / "reference" / "scenario-fields.html").read_text(encoding="utf-8")
+    fields = texts[site / "reference" / "scenario-fields.html"]
     assert all(name in fields for name in ("stiffness_k1_nm_per_rad", "position_gain_per_s", "gap_factor"))
-
-
-@pytest.mark.slow
-def test_the_gallery_has_a_picture_of_every_example(site: Path) -> None:
     for path in (DOCS / "gallery").glob("*.py"):
         assert list((site / "_images").glob(f"sphx_glr_{path.stem}_00*.png")), path.stem
 
 
-@pytest.mark.slow
-def test_formulas_are_markup_that_browsers_know(site: Path) -> None:
-    page = (site / "generated" / "gallery" / "plot_7_fit_friction.html").read_text(encoding="utf-8")
-    assert "<math" in page
-    assert "mathjax" not in page.lower()
+def test_a_dead_link_is_seen(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.html").touch()
+    links = ["b.html", "b.html#x", "#y", "#z", "c.html", "https://example.org/"]
+    text = "<p id=y>" + "".join(f'<a href="{link}">' for link in links)
+    pages = {tmp_path / "a.html": Page(text), tmp_path / "b.html": Page("<p id=w>")}
+    assert dead_links(tmp_path, pages) == ["a.html: #z", "a.html: b.html#x", "a.html: c.html"]
 
 
 def test_the_navigation_has_every_page_once() -> None:
