@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hdsim.notebook.tasks import diagnose, fit, plant, plants, study
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
+    from hdsim.scenario.examples import example
     from hdsim.simulation.ensemble import simulate_all
     from hdsim.simulation.linear import io_system, linearize
     from hdsim.simulation.simulate import simulate
@@ -35,6 +36,7 @@ __all__ = [
     "Recording",
     "Scenario",
     "diagnose",
+    "example",
     "fit",
     "import_recording",
     "io_system",
@@ -53,6 +55,7 @@ _HOMES = {
     "Recording": "hdsim.recording",
     "Scenario": "hdsim.scenario",
     "diagnose": "hdsim.notebook.tasks",
+    "example": "hdsim.scenario.examples",
     "fit": "hdsim.notebook.tasks",
     "import_recording": "hdsim.log.importing",
     "io_system": "hdsim.simulation.linear",

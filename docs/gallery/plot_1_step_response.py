@@ -10,10 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hdsim
-from hdsim.scenario.examples import examples
 
 START_S = 0.05
-joint = hdsim.load_scenario(examples()["move_and_settle"]).with_(
+joint = hdsim.example("move_and_settle").with_(
     {
         "drive.mesh": {"model": "lumped"},  # the catalogue's stiffness: fast, and without single teeth
         "command.motor.trajectory": {"type": "step", "height_deg": 1.0, "start_time_s": START_S},

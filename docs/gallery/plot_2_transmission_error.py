@@ -12,9 +12,8 @@ import numpy as np
 
 import hdsim
 from hdsim.log.orders import order_spectrum
-from hdsim.scenario.examples import examples
 
-bench = hdsim.load_scenario(examples()["constant_speed"]).with_(
+bench = hdsim.example("constant_speed").with_(
     {"load.inertia_kg_m2": 0.002},  # an encoder alone, so that no resonance comes near
     drive={"preset": "csg-20-100", "mesh": {"model": "lumped"}},
     effects={"set": "catalogue"},  # kinematic error and hysteresis as large as the catalogue prints

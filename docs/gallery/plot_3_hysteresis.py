@@ -10,9 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hdsim
-from hdsim.scenario.examples import examples
 
-bench = hdsim.load_scenario(examples()["torsion_cycle"]).with_(
+bench = hdsim.example("torsion_cycle").with_(
     drive={"preset": "csg-20-100", "mesh": {"model": "lumped"}},
     effects={"set": "catalogue"},
 )

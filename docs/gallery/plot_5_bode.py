@@ -13,13 +13,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hdsim
-from hdsim.scenario.examples import examples
 from hdsim.simulation.linear import find_operating_point
 from hdsim.simulation.modes import modes
 
-joint = hdsim.load_scenario(examples()["move_and_settle"]).with_(
-    {"drive.mesh": {"model": "lumped"}, "effects": {}}
-)
+joint = hdsim.example("move_and_settle").with_({"drive.mesh": {"model": "lumped"}, "effects": {}})
 point = find_operating_point(joint, load_torque_nm=-26.0, motor_velocity_rad_per_s=50.0)
 drive = hdsim.linearize(joint, operating_point=point, outputs=("motor_velocity", "output_velocity"))
 resonance = max(modes(drive), key=lambda mode: mode.frequency_hz)

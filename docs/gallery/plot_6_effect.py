@@ -11,9 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hdsim
-from hdsim.scenario.examples import examples
 
-bench = hdsim.load_scenario(examples()["constant_speed"]).with_(
+bench = hdsim.example("constant_speed").with_(
     {
         "command.motor.trajectory": {"type": "sine", "amplitude_turns": 4.0, "frequency_hz": 0.1},
         "run.duration_s": 10.0,

@@ -15,9 +15,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hdsim
-from hdsim.scenario.examples import examples
 
-model = hdsim.load_scenario(examples()["sine_tracking"]).with_(
+model = hdsim.example("sine_tracking").with_(
     {
         "effects": {},
         "command.motor.trajectory.frequency_hz": 0.5,

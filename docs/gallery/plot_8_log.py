@@ -13,9 +13,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hdsim
-from hdsim.scenario.examples import examples
 
-move = hdsim.load_scenario(examples()["move_and_settle"]).with_({"drive.mesh": {"model": "lumped"}})
+move = hdsim.example("move_and_settle").with_({"drive.mesh": {"model": "lumped"}})
 result = hdsim.simulate(move)
 with TemporaryDirectory() as folder:
     path = result.save(Path(folder) / "move.mcap")

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from hdsim.errors import InputError
+from hdsim.scenario import loaded
 
 if TYPE_CHECKING:
     import pandas
@@ -75,7 +76,7 @@ def diagnose(
     base = _file_for(scenario, out)
     records, held = _records(measured, mapping), _records(holdout, mapping)
     found = run(
-        records, _loaded(scenario), holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
+        records, loaded(scenario), holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
         on_step=on_step,
     )  # fmt: skip
     if base is not None and out is not None:
@@ -133,7 +134,7 @@ def fit(
     base = _file_for(scenario, out)
     records, held = _records(measured, mapping), _records(holdout, mapping)
     found = estimate(
-        records, _loaded(scenario), holdout=held, free=free, fix=fix, apart=apart, load=load, zeros=zeros,
+        records, loaded(scenario), holdout=held, free=free, fix=fix, apart=apart, load=load, zeros=zeros,
         force=force, black_box=black_box, on_step=on_step,
     )  # fmt: skip
     if base is not None and out is not None:
@@ -207,7 +208,7 @@ def plant(
     """
     from hdsim.simulation.stepped import SteppedPlant
 
-    return SteppedPlant(_loaded(scenario), motor=motor, output=output)
+    return SteppedPlant(loaded(scenario), motor=motor, output=output)
 
 
 def plants(
@@ -234,15 +235,8 @@ def plants(
     """
     from hdsim.simulation.stepped_batch import SteppedPlants
 
-    loaded = [_loaded(scenario) for scenario in scenarios]
+    loaded = [loaded(scenario) for scenario in scenarios]
     return SteppedPlants(loaded, motor=motor, output=output, threads=threads)
-
-
-def _loaded(scenario: AnyScenario) -> Scenario:
-    """A scenario, read where it is a file."""
-    from hdsim.scenario import Scenario
-
-    return Scenario.from_yaml(scenario) if isinstance(scenario, str | Path) else scenario
 
 
 def _file_for(scenario: AnyScenario, out: str | Path | None) -> str | Path | None:
@@ -321,7 +315,7 @@ def _plan(
         if not isinstance(base, str | Path) or parameters or options:
             raise InputError("a study of a scenario needs metrics; hdsim.study(file) runs a study's file")
         return load_study(base)
-    scenario = _loaded(base)
+    scenario = loaded(base)
     varied = {
         name: {"type": "list", "values": copied(given)} if not isinstance(given, Mapping) else copied(given)
         for name, given in (parameters or {}).items()

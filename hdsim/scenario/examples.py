@@ -7,11 +7,14 @@ import os
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hdsim.errors import InputError
 from hdsim.scenario.extends import read
 from hdsim.scenario.reader import read_node
+
+if TYPE_CHECKING:
+    from hdsim.scenario.model import Scenario
 
 #: Subfolder whose files are plain models for ``hdsim diagnose``; what else is below is no scenario.
 BASES = "bases"
@@ -39,6 +42,33 @@ def examples() -> dict[str, Path]:
     return {path.relative_to(home).with_suffix("").as_posix(): path for path in found}
 
 
+def path_of(name: str) -> Path:
+    """The file of an example.
+
+    Raises:
+        InputError: there is none of this name; the message has the nearest, or all.
+    """
+    known = examples()
+    if name not in known:
+        near = get_close_matches(name, known, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(known)}"
+        raise InputError(f"no example {name!r}{hint}")
+    return known[name]
+
+
+def example(name: str) -> Scenario:
+    """A scenario that comes with hdsim; ``hdsim examples`` lists them.
+
+    >>> hdsim.example("move_and_settle")
+
+    Raises:
+        InputError: there is none of this name.
+    """
+    from hdsim.scenario.model import Scenario
+
+    return Scenario.from_yaml(path_of(name))
+
+
 def description(path: Path) -> str:
     """What a scenario says of itself, its first paragraph on one line; the name where it has no more."""
     data: dict[str, Any] = read(path).data
@@ -62,18 +92,14 @@ def copy(name: str, out: Path | None = None) -> list[Path]:
     from hdsim.scenario.model import Scenario
     from hdsim.scenario.schema import json_schema
 
-    known = examples()
-    if name not in known:
-        near = get_close_matches(name, known, 1)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(known)}"
-        raise InputError(f"no example {name!r}{hint}")
-    out = Path(known[name].name) if out is None else out
+    source = path_of(name)
+    out = Path(source.name) if out is None else out
     if out.suffix != ".yaml":
         raise InputError(f"{out}: expected a file name that ends in .yaml")
-    text = known[name].read_text(encoding="utf-8")
+    text = source.read_text(encoding="utf-8")
     first = f"# yaml-language-server: $schema={SCHEMA}\n"
     texts = {out: text if text.startswith(first) else first + text}
-    for base in _bases(known[name]):
+    for base in _bases(source):
         if base.name == out.name:
             raise InputError(f"{out}: what the example extends has this name; give another one")
         texts[out.parent / base.name] = base.read_text(encoding="utf-8")

@@ -21,12 +21,15 @@ from numpy.typing import NDArray
 
 from hdsim.drive import _layout as layout
 from hdsim.recording import Column, Event, Recording, Table
+from hdsim.scenario import loaded
 from hdsim.simulation.failures import speed_guard
 from hdsim.simulation.run import Run, RunFailed, joined
 from hdsim.simulation.setup import build_run
 from hdsim.simulation.spans import stops
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from hdsim.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -113,7 +116,7 @@ def in_order(function: Callable[[Given], T], items: Sequence[Given], threads: in
 
 
 def simulate_all(
-    scenarios: Sequence[Scenario],
+    scenarios: Sequence[Scenario | str | Path],
     channels: Sequence[str],
     *,
     threads: int | None = None,
@@ -124,7 +127,7 @@ def simulate_all(
     What is kept is bounded by the channels asked for: a run's states are gone when they have been read.
 
     Args:
-        scenarios: what to simulate.
+        scenarios: what to simulate, or their files.
         channels: names of channels of the state table.
         threads: runs at the same time; when None as many as there are cores, up to four.
         pool: an executor that makes them instead (processes, a Dask client's), ``threads`` at a time.
@@ -136,13 +139,14 @@ def simulate_all(
         InputError: there is no such channel.
         RunFailed: a run stopped early.
     """
+    given = [loaded(scenario) for scenario in scenarios]
     if pool is None:
-        return in_order(partial(_channels, channels=tuple(channels)), scenarios, threads)
+        return in_order(partial(_channels, channels=tuple(channels)), given, threads)
     # As plain data: classes of a scenario's sections are made as they are needed, and cannot be pickled.
-    data = (scenario.model_dump(mode="json") for scenario in scenarios)
+    data = (scenario.model_dump(mode="json") for scenario in given)
     width = _threads.get() if threads is None else threads
     found = dict(as_completed(partial(_channels_of, channels=tuple(channels)), data, pool, width))
-    return [found[index] for index in range(len(scenarios))]
+    return [found[index] for index in range(len(given))]
 
 
 def _channels_of(data: dict[str, Any], channels: tuple[str, ...]) -> dict[str, Array]:

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.scenario import loaded
 from hdsim.simulation.operating_point import OperatingPoint as OperatingPoint
 from hdsim.simulation.operating_point import find_operating_point as find_operating_point
 from hdsim.simulation.plant import Plant
 from hdsim.simulation.ports import INPUTS
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import control
 
     from hdsim.scenario import Scenario
@@ -33,7 +36,7 @@ OUTPUTS = (
 
 
 def linearize(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     *,
     operating_point: OperatingPoint | None = None,
     time: float = 0.0,
@@ -49,7 +52,7 @@ def linearize(
     tabulated spring, at the edge of the gap) the derivative is the one on the side of the point.
 
     Args:
-        scenario: the drive with effects and load.
+        scenario: the drive with effects and load, or its file.
         operating_point: from ``find_operating_point``; the balance under the scenario's own load torque when
             None.
         time: at which that load torque is read, s.
@@ -68,6 +71,7 @@ def linearize(
     """
     import control as ct
 
+    scenario = loaded(scenario)
     if hold_motor:
         inputs = tuple(name for name in inputs if name != "motor_torque")
     for name in inputs:
@@ -154,7 +158,7 @@ def close_loop(scenario: Scenario, plant: control.StateSpace) -> control.StateSp
 
 
 def io_system(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     *,
     dt_s: float | None = None,
     motor: MotorInput = "torque",
@@ -173,7 +177,7 @@ def io_system(
     from the ideal gear, so that tolerances mean the same after many turns.
 
     Args:
-        scenario: the drive with effects, inertia and gravity.
+        scenario: the drive with effects, inertia and gravity, or its file.
         dt_s: time between two samples, s; continuous time when None.
         motor: input on the motor's side, as for ``SteppedPlant``; only ``torque`` in continuous time.
         output: input on the output's side: ``torque``, or ``motion``: ``prescribed_output_angle``,
@@ -189,6 +193,7 @@ def io_system(
     Raises:
         InputError: an output that there is not, or a motion in continuous time.
     """
+    scenario = loaded(scenario)
     chosen = OUTPUTS if outputs is None else tuple(outputs)
     if dt_s is not None:
         from hdsim.simulation.sampled_block import sampled_block

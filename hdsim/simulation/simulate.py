@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from hdsim.scenario import loaded
 from hdsim.simulation.run import Run, RunFailed
 from hdsim.simulation.setup import build_run
 
@@ -28,7 +29,7 @@ _PACKAGES = ("hdsim", "numpy", "scipy", "numba", "control", "mcap", "pydantic")
 
 
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     *,
     on_time: Callable[[float], object] | None = None,
     strict: bool = True,
@@ -37,7 +38,7 @@ def simulate(
     """Simulate a scenario and keep the result in memory.
 
     Args:
-        scenario: what to simulate.
+        scenario: what to simulate, or its file.
         on_time: called now and then with the simulated time that has been reached, s.
         strict: raise when the run stops early; else return what was computed, with the event that says why.
         sensitivities: dotted names of numbers of the scenario; ``result.sensitivities[name][channel]`` is
@@ -52,6 +53,7 @@ def simulate(
     """
     from hdsim.simulation.sensitivities import derivatives, models_beside
 
+    scenario = loaded(scenario)
     # First of all: what has no derivative is said before the run.
     beside = models_beside(scenario, sensitivities) if sensitivities else None
     run = build_run(scenario)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hdsim
@@ -81,3 +82,25 @@ def test_new_without_a_name_lists_them(capsys: pytest.CaptureFixture[str]) -> No
         listings.append(capsys.readouterr().out)
     assert listings[0] == listings[1]
     assert all(name in listings[0] for name in examples())
+
+
+def test_an_example_is_one_call_and_a_file_is_as_good_as_what_it_holds() -> None:
+    example = hdsim.example("torsion_cycle").with_({"run.duration_s": 0.01})
+    path = SCENARIOS / "torsion_cycle.yaml"
+    assert example.drive == hdsim.load_scenario(path).drive
+    by_file = hdsim.linearize(path)
+    np.testing.assert_array_equal(by_file.A, hdsim.linearize(hdsim.load_scenario(path)).A)
+    with pytest.raises(InputError, match="did you mean 'torsion_cycle'"):
+        hdsim.example("torsion_cycel")
+
+
+def test_a_scenario_is_simulated_from_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "joint.yaml"
+    path.write_text(
+        "drive: {preset: csg-20-100, mesh: {model: lumped}}\ncommand: {motor: {type: locked}}\nrun: {duration_s: 0.01}\n"
+    )
+    result = hdsim.simulate(path)
+    again = hdsim.simulate_all([str(path)], ["motor_angle"])[0]
+    np.testing.assert_array_equal(again["motor_angle"], result["motor_angle"])
+    with pytest.raises(InputError, match=r"nowhere\.yaml"):
+        hdsim.simulate(tmp_path / "nowhere.yaml")
