@@ -173,7 +173,7 @@ class Observer:
         """The numbers of the scratch at some places, shape (samples, places)."""
         system = self.model.system
         rows = np.empty((len(times), len(places)))
-        if not np.setdiff1d(places, self._coordinates).size:
+        if set(places.tolist()) <= set(self._coordinates):
             observe_coordinates(
                 times,
                 np.ascontiguousarray(states),
