@@ -14,6 +14,7 @@ from scipy.interpolate import PPoly
 
 from hdsim.contact import tabulate
 from hdsim.drive import _mesh_layout
+from hdsim.drive._quartic import CORNERS
 
 
 def sine(signal, quantity, unit):
@@ -69,8 +70,10 @@ class NumpyDrive:
             int(p[_mesh_layout.SPRING_CELLS]),
             p[_mesh_layout.SPRING_STEP],
         )
+        self.corners = p[at : at + 2 * CORNERS].reshape(CORNERS, 2)
+        at += 2 * CORNERS
         cup = p[at : at + 5 * cells].reshape(cells, 5)[:, 3::-1].T
-        self.cup = PPoly(cup, step * np.arange(cells + 1))
+        self.straightened_cup = PPoly(cup, step * np.arange(cells + 1))
 
         # Kinematic error, controller, load.
         effects = scenario.effects.active()
@@ -88,6 +91,11 @@ class NumpyDrive:
         assert motor.sample_period_s is None
         self.reference, self.law = sine(motor.trajectory, "deg", math.radians(1.0)), motor.controller
         self.load = sine(scenario.load.torque, "nm", 1.0)
+
+    def cup(self, twist):
+        """Torque of the cup (N m) at a twist (rad) from 0 on: a smooth curve, and its corners."""
+        beyond = np.maximum(twist - self.corners[:, 0], 0.0)
+        return self.straightened_cup(twist) + self.corners[:, 1] @ beyond
 
     def tooth_forces(self, shift, turn):
         """Sum of the teeth's forces (N), and of their torques by the slope of the arcs' ends (N m).

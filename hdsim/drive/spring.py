@@ -137,7 +137,7 @@ def spring_numbers(
     from hdsim.drive._quartic import CORNERS
 
     def total(torque: Array) -> Array:
-        return scale * np.sum([wind_up(torque) for wind_up in wind_ups], axis=0)
+        return np.asarray(scale * np.sum([wind_up(torque) for wind_up in wind_ups], axis=0))
 
     # Denser towards zero, where a play is taken up.
     near = np.geomspace(1e-6, 1e-1, 400) * largest_torque_nm

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,7 +106,6 @@ class Run:
         self.audit = Audit()
         self.statistics = Statistics()
         self.events: list[Event] = []
-        self.detector = EventDetector(model, duration_s)
         #: Called before every span with its start (s); what it returns, if anything, is called once the
         #: samples so far have been handed out: it may change the system's reals (live parameters).
         self.before_span: Callable[[float], Callable[[], object] | None] | None = None
@@ -116,6 +116,11 @@ class Run:
         # True channels as far back as the sensors look: for the controller, and for the log.
         self._recent: Table | None = None
         self._history: Table | None = None
+
+    @cached_property
+    def detector(self) -> EventDetector:
+        """What notices events; a run of an ensemble has none."""
+        return EventDetector(self.model, self.duration_s)
 
     def spans(self) -> Array:
         """Times at which the integration is cut, from 0 to the duration: shape (spans + 1,)."""

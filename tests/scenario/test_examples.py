@@ -97,7 +97,10 @@ def test_an_example_is_one_call_and_a_file_is_as_good_as_what_it_holds() -> None
 def test_a_scenario_is_simulated_from_its_file(tmp_path: Path) -> None:
     path = tmp_path / "joint.yaml"
     path.write_text(
-        "drive: {preset: csg-20-100, mesh: {model: lumped}}\ncommand: {motor: {type: locked}}\nrun: {duration_s: 0.01}\n"
+        "drive: {preset: csg-20-100, mesh: {model: lumped}}\n"
+        "command: {motor: {type: locked}}\n"
+        "load: {inertia_kg_m2: 0.1}\n"
+        "run: {duration_s: 0.01}\n"
     )
     result = hdsim.simulate(path)
     again = hdsim.simulate_all([str(path)], ["motor_angle"])[0]
