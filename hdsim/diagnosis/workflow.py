@@ -31,7 +31,8 @@ from hdsim.estimate.numbers import Interval
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
-from hdsim.estimate.predict import LoadSource, PredictionError
+from hdsim.estimate.plan import LoadSource
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit, tie, together

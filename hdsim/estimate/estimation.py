@@ -20,7 +20,8 @@ from hdsim.estimate.numbers import Free, Interval, base_freedoms, undeclared
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked
-from hdsim.estimate.predict import LoadSource, PredictionError
+from hdsim.estimate.plan import LoadSource
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit

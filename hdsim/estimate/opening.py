@@ -10,7 +10,8 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import check_records
 from hdsim.estimate.data_problems import Check
 from hdsim.estimate.offsets import Zeros
-from hdsim.estimate.predict import LoadSource, Locked, predictors
+from hdsim.estimate.plan import LoadSource, Locked
+from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record, record_from
 from hdsim.estimate.short_cut import take_short_cut
 from hdsim.estimate.state import state_of

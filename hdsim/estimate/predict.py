@@ -13,14 +13,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdsim.errors import InputError, PhysicsError
+from hdsim.errors import PhysicsError
 from hdsim.estimate.knots import least_squares_spline
 from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
+from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, pieces_of, signal, smoothed, spline_through
 from hdsim.estimate.unloaded import unloaded_angle
@@ -42,26 +43,6 @@ RTOL, COARSE_RTOL = 1e-6, 3e-5
 #: How much more closely the whole model of a drive with teeth follows its ring (``Model.seen_scale``).
 CLOSER = 10.0
 
-Locked = Literal["", "motor", "output"]
-LoadSource = Literal["scenario", "load_torque", "output_torque"]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a model is told of a record, and what it is asked.
-
-    Attributes:
-        motion: ``motor_angle`` or ``output_angle``: the measured motion that is prescribed.
-        load: where the load's torque comes from.
-        channels: the channels that are predicted.
-        locked: the side that the scenario locks, if any.
-    """
-
-    motion: str
-    load: LoadSource
-    channels: tuple[str, ...]
-    locked: Locked = ""
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -71,55 +52,6 @@ class Candidate:
     effects: dict[str, Effect]
     load: Any
     seed: int = 0
-
-
-def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked = "") -> Plan:
-    """Decide what is prescribed and what can be predicted.
-
-    Args:
-        record: the measured run.
-        load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
-        locked: the side that the scenario locks, if any.
-
-    Raises:
-        InputError: nothing can be predicted; the message names what is missing.
-    """
-    has = record.readable
-    moving = {c for c in has if float(np.ptp(record.filled(c))) > 0}
-    if load is None:
-        load = "load_torque" if "load_torque" in moving else "scenario"
-    if load != "scenario" and load not in has:
-        raise InputError(f"{record.name}: the load is to come from {load}, which is not measured")
-    if locked == "motor":
-        return _motor_locked(record, moving)
-    if "motor_angle" in has:
-        motion = "motor_angle"
-    elif "output_angle" in has and not locked:
-        motion = "output_angle"
-    else:
-        raise InputError(
-            f"{record.name}: a motion is needed, motor_angle or output_angle; found {', '.join(sorted(has))}"
-        )
-    predicted = [c for c in ("motor_torque", "output_angle", "output_torque") if c in moving]
-    if motion == "output_angle" or locked:
-        predicted = [c for c in predicted if c != "output_angle"]
-    if not predicted:
-        raise InputError(
-            f"{record.name}: nothing can be predicted from {', '.join(sorted(has))}: with {motion} given, "
-            "motor_torque, output_torque or (with motor_angle) output_angle must be measured and vary"
-        )
-    return Plan(motion, load, tuple(predicted), locked)
-
-
-def _motor_locked(record: Record, moving: set[str]) -> Plan:
-    """A drive that is twisted from its output: the torque follows from the angle."""
-    if {"output_angle", "output_torque"} <= moving:
-        return Plan("output_angle", "scenario", ("output_torque",), "motor")
-    raise InputError(
-        f"{record.name}: with the motor locked, output_angle and output_torque are needed and must vary; "
-        f"found {', '.join(sorted(moving)) or 'nothing that varies'} (a load that is measured at the output, "
-        "without inertia between, may be given as output_torque with its sign reversed)"
-    )
 
 
 class Predictor:

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hdsim.estimate.noise import noise_floor
-from hdsim.estimate.predict import LoadSource, Locked, plan_for
+from hdsim.estimate.plan import LoadSource, Locked, plan_for
 from hdsim.estimate.records import Array, Record
 
 #: Readings that a mean may hold.

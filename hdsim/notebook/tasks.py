@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hdsim.diagnosis.workflow import Diagnosis
     from hdsim.estimate.estimation import Estimation
     from hdsim.estimate.offsets import Zeros
-    from hdsim.estimate.predict import LoadSource
+    from hdsim.estimate.plan import LoadSource
     from hdsim.estimate.records import Record
     from hdsim.log.mapping import Mapping as ColumnMapping
     from hdsim.recording import Recording
