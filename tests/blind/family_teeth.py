@@ -8,7 +8,7 @@ times a factor, and the structure behind the mesh keeps its spring: the catalogu
 that.
 
 Strength: the plant's drive with and without what is hidden, along the motion of the plant without it, both
-with every tooth; offsets are taken out.
+with every tooth; least squares take out offsets and the sensitivities of the base's own numbers.
 """
 
 from __future__ import annotations
@@ -56,9 +56,8 @@ STRENGTHS = (1.0, 60.0)
 PITCH_ERROR_M, SHARE, EDGE = 2e-7, (0.25, 0.35), (5.0, 12.0)
 SECONDS = (6.0, 9.0)
 #: Numbers that the base may bend, and by how much they are changed to see what that does.
-OWN = (
-    "motor_inertia", "load_inertia", "damping", "coulomb", "viscous", "load_loss", "arm", "stiffness", "torques",
-)  # fmt: skip
+OWN = ("motor_inertia", "load_inertia", "damping", "coulomb", "viscous", "load_loss", "arm", "stiffness",
+       "torques")  # fmt: skip
 CHANGE = 0.02
 MEMBERS = ("flexspline", "circular_spline")
 
