@@ -162,6 +162,8 @@ def meaning(found: Findings) -> str:
         said += " No formula is exact: what it leaves of its own shape is said below, and not in found.yaml."
     if verdict.teeth is not None:
         said = " ".join([said, *verdict.teeth.sentences])
+        if verdict.teeth.scenario:
+            said += " That drive is written as toothed.yaml."
     if verdict.verdict == "unknown":
         said += (
             " Instead it is given as a curve, which found.yaml adds to the model."
