@@ -77,7 +77,7 @@ def _gap(found: TeethFound, effect: NamedEffect, state: State) -> None:
         value=gaps[0], interval=(min(gaps[1:]), max(gaps[1:])) if gaps[1:] else None, start=1e6 * start
     )
     found.sentences.append(
-        f"The teeth's mean half-gap is {gaps[0]:.3g} um{_ends(found.half_gap_um)} instead of "
+        f"The teeth's mean half-gap is {gaps[0]:.3g} µm{_ends(found.half_gap_um)} instead of "
         f"{1e6 * start:.3g}."
     )
 
@@ -91,7 +91,7 @@ def _play(found: TeethFound, effect: NamedEffect, state: State) -> None:
     found.half_gap_um = FittedNumber(value=gaps[0], interval=(gaps[1], gaps[2]) if gaps[1:] else None)
     radius = 1e3 * state.drive.geometry.pitch_radius_m
     said = (
-        f"Between teeth this play is a mean half-gap of {gaps[0]:.3g} um{_ends(found.half_gap_um)} at a "
+        f"Between teeth this play is a mean half-gap of {gaps[0]:.3g} µm{_ends(found.half_gap_um)} at a "
         f"pitch radius of {radius:.4g} mm"
     )
     try:
@@ -111,8 +111,8 @@ def _rough(teeth: PlayAsTeeth) -> str:
     said = f"that is {flanks}, flanks {teeth.heights:.3g} times as high as nominal ones."
     if not teeth.rough:
         said += (
-            " So rough ones would be plastic at every tooth load: it is wear, and the written drive has "
-            "nominal flanks worn apart."
+            " So rough ones would be plastic at the mean tooth load of the rated torque: it is wear, and the "
+            "written drive has nominal flanks worn apart."
         )
     return said
 

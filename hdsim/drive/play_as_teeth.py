@@ -35,8 +35,9 @@ class PlayAsTeeth:
         heights: of the flanks over those that were given.
         roughness_m: fractal roughness G of each flank that leaves the half-gap, m.
         dimensions: fractal dimension D of each, which stays.
-        rough: whether ``changes`` has these flanks; else so rough ones would be plastic under every tooth
-            load, where the contact's equations end, and the gap is that of the given flanks worn apart.
+        rough: whether ``changes`` has these flanks; else so rough ones would be plastic under the mean tooth
+            load at rated torque, where the contact's equations end, and the gap is that of the given flanks
+            worn apart.
         changes: of the scenario's section ``drive``, nested.
     """
 
@@ -89,15 +90,18 @@ def play_as_teeth(drive: Drive, play_rad: float, *, seed: int = 0) -> PlayAsTeet
         raise PhysicsError(f"no roughness of flanks leaves a half-gap of {1e6 * half_gap:.3g} um")
     torsion = drive.torsion
     softer = 1.0 / torsion.stiffness_k1_nm_per_rad + 0.5 * play_rad / torsion.torque_t1_nm
-    new = {
+    new: dict[str, Any] = given.get("flanks", {}) | {
         name: {"fractal_dimension": dimensions[name], "fractal_roughness_m": value}
         for name, value in roughness.items()
     }
     rougher = TeethMesh.model_validate(given | {"model": "teeth", "flanks": new})
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always", ValidityWarning)
-        rougher.contact.build(rougher.flanks.equivalent())
-    rough = not any(issubclass(one.category, ValidityWarning) for one in told)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ValidityWarning)
+        law = rougher.contact.build(rougher.flanks.equivalent())
+    lever = half_gap_of_play(drive, 2.0)  # a play of two radians is a half-gap of one lever
+    tooth_force = drive.rated_torque_nm / (mesh.engagement.share * drive.geometry.flexspline_teeth * lever)
+    # Below this force nothing is elastic; of laws that know none the roughness does not matter.
+    rough = getattr(law, "all_plastic_force_n", 0.0) < tooth_force
     changes: dict[str, Any] = {
         "torsion": {"stiffness_k1_nm_per_rad": 1.0 / softer},
         "mesh": given | {"model": "teeth"} | ({"flanks": new} if rough else {"gap_factor": heights}),

@@ -168,6 +168,8 @@ def meaning(found: Findings) -> str:
         )
     if verdict.teeth is not None:
         said = " ".join([said, *verdict.teeth.sentences])
+        if verdict.teeth.scenario:
+            said += " That drive is written as toothed.yaml."
     if verdict.verdict == "unknown":
         said += (
             " It is estimated as a curve instead, which found.yaml adds to the model."

@@ -8,7 +8,7 @@ times a factor, and the structure behind the mesh keeps its spring: the catalogu
 that.
 
 Strength: the plant's drive with and without what is hidden, along the motion of the plant without it, both
-with every tooth; offsets are taken out.
+with every tooth; least squares take out offsets and the sensitivities of the base's own numbers.
 """
 
 from __future__ import annotations
@@ -55,6 +55,10 @@ STRENGTHS = (1.0, 60.0)
 #: Nominal standard deviation of the pitch errors, m, and ranges of what else a plant draws anew.
 PITCH_ERROR_M, SHARE, EDGE = 2e-7, (0.25, 0.35), (5.0, 12.0)
 SECONDS = (6.0, 9.0)
+#: Numbers that the base may bend, and by how much they are changed to see what that does.
+OWN = ("motor_inertia", "load_inertia", "damping", "coulomb", "viscous", "load_loss", "arm", "stiffness",
+       "torques")  # fmt: skip
+CHANGE = 0.02
 MEMBERS = ("flexspline", "circular_spline")
 
 
@@ -188,11 +192,19 @@ def _strength(
     d: Drive, plant: Drive, sensing: Sensing, one: Any, plain: Drawn, teeth: Drawn, effects: Effects
 ) -> float:
     """Of what is hidden, in the channel where it shows most."""
-    rate = sensing.rate
+    rate, skip = sensing.rate, round(SKIP_S * sensing.rate)
     like = simulate(base_yaml(d), d, plain, {}, one, rate)["standing"]
-    skip = round(SKIP_S * rate)
-    found = []
-    for numbers, mesh, extra in ((d, plain, {}), (plant, teeth, effects)):
+
+    def weighed(numbers: Drive, mesh: Drawn, extra: Effects) -> np.ndarray:
         run = simulate(base_yaml(numbers), d, mesh, extra, one, rate, like)
-        found.append(np.array([run[c][skip:] / sensing.sigma(c) for c in sensing.compared]))
-    return visible(found[1] - found[0], [])[1]
+        return np.array([run[c][skip:] / sensing.sigma(c) for c in sensing.compared])
+
+    without = weighed(d, plain, {})
+    table = replace(plain, model="tabulated")
+    given = weighed(d, table, {})
+    columns = [given * np.array([[c == "motor_torque"] for c in sensing.compared])]
+    for name in OWN:
+        value = getattr(d, name)
+        changed = tuple(v * (1 + CHANGE) for v in value) if isinstance(value, tuple) else value * (1 + CHANGE)
+        columns.append(weighed(replace(d, **{name: changed}), table, {}) - given)
+    return visible(weighed(plant, teeth, effects) - without, columns)[1]

@@ -22,7 +22,7 @@ from telling import (
 
 from hdsim.diagnosis.evidence import HeldOutEvidence
 from hdsim.diagnosis.further import CurveFound
-from hdsim.diagnosis.verdict import Remainder
+from hdsim.diagnosis.verdict import Remainder, TeethFound
 from hdsim.estimate.found import FittedNumber
 from hdsim.tell.wording import farthest, headline, meaning, much_left, sureness
 
@@ -243,3 +243,14 @@ def test_a_number_without_a_spread_is_infinitely_far_and_does_not_crash():
     found = told(PARAMETER, parameters={FRICTION: number}, moved=[FRICTION])
     assert math.isinf(farthest(found.verdict))
     assert sureness(found).number == "over 100 standard errors"
+
+
+def test_what_a_verdict_says_of_teeth_is_said_where_it_says_what_it_means():
+    found = told(EFFECT)
+    teeth = TeethFound(sentences=["It is tooth 57 (56 to 58) of the flexspline."])
+    plain = meaning(found)
+    said = meaning(type(found)(found.verdict.model_copy(update={"teeth": teeth}), EFFECT))
+    assert said == f"{plain} It is tooth 57 (56 to 58) of the flexspline."
+    written = teeth.model_copy(update={"scenario": "out/toothed.yaml"})
+    said = meaning(type(found)(found.verdict.model_copy(update={"teeth": written}), EFFECT))
+    assert said.endswith("toothed.yaml.")

@@ -1,0 +1,115 @@
+"""A base with teeth: which tooth is out of place is found from where it passes, with its interval."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hdsim
+from hdsim.diagnosis.screen import Residual
+from hdsim.diagnosis.search import left_of
+from hdsim.diagnosis.starts import neighbours, starts
+from hdsim.diagnosis.teeth import teeth_found
+from hdsim.diagnosis.traces import screen, traces
+from hdsim.diagnosis.verdict import NamedEffect
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, added_spreads, fit
+from hdsim.estimate.numbers import base_freedoms
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.records import Record
+from hdsim.estimate.state import Added, state_of
+from hdsim.estimate.write import fitted_numbers
+from hdsim.scenario import Scenario
+
+
+def scenario(effects: dict[str, Any], model: str = "tabulated") -> Scenario:
+    mesh = {"model": model} | ({"ring": "static"} if model in ("teeth", "tabulated") else {})
+    return Scenario.model_validate(
+        {
+            "drive": {"preset": "seed-2021", "mesh": mesh, "torsion": {"damping_nm_s_per_rad": 40.0}},
+            "effects": effects,
+            "command": {
+                "motor": {
+                    "type": "motion",
+                    "trajectory": {"type": "sine", "amplitude_deg": 2600, "frequency_hz": 0.4},
+                }
+            },
+            "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 8.0, "centre_of_mass_m": 0.4}},
+            "run": {"duration_s": 3.1, "sample_rate_hz": 250, "teeth_rate_hz": 0},
+        }
+    )
+
+
+def bench_of(effects: dict[str, Any]) -> tuple[Bench, Fit]:
+    """A record of a drive with all its teeth, and the base's fit without its own numbers moved."""
+    run, rng = hdsim.simulate(scenario(effects, "teeth")), np.random.default_rng(1)
+    late = run.time >= 0.6 - 1e-9
+    time = run.time[late] - 0.6
+    noise = {"motor_angle": 2e-6, "output_angle": 1e-6, "motor_torque": 3e-3}
+    channels = {c: run[c][late] + s * rng.standard_normal(len(time)) for c, s in noise.items()}
+    base = scenario({})
+    bench = bench_for([Record("r", time, channels)], [], base, None)
+    state = state_of(base)
+    bench.weigh(bench.residuals(bench.predict(state)))
+    frees = [free for free in base_freedoms(state, bench.channels) if "mass" in free.name]
+    return bench, fit(bench, state, frees, prune=False, evaluations=4, rough=True)
+
+
+@pytest.mark.parametrize(("member", "tooth"), [("flexspline", 57.0), ("circular_spline", 171.0)])
+def test_the_tooth_that_is_out_of_place_is_found_on_its_spline(member: str, tooth: float) -> None:
+    bench, base = bench_of({"tooth_error": {"member": member, "tooth": tooth, "shift_um": 12.0}})
+    left = left_of(bench, base)
+    ranges = bench.ranges(base.state)
+    tried = [
+        added
+        for way in catalogue()["tooth_error"].fittings
+        for added in starts("tooth_error", way, (), ranges)
+    ]
+    assert len(tried) == 24
+    wanted = float(np.sqrt(left.power / len(left.values)))
+    found: list[tuple[Added, Any]] = []
+    for times in range(3):  # as the screen does
+        with bench.coarse():
+            found += traces(bench, base.state, base.predictions, tried, wanted)
+        best, columns = max(
+            ((added, x) for added, x in found if x is not None), key=lambda one: left.share(one[1]).share
+        )
+        tried = neighbours(best, times)
+    assert best.settings()["member"] == member
+    sized = replace(best, coefficients=tuple(left.share(columns).coefficients))
+    start = replace(base.state, added=(sized,))
+    fitted = fit(bench, start, base.frees, prune=False, evaluations=10, after=base)
+    ((added, covariance, shapes),) = added_spreads(fitted)
+    numbers = fitted_numbers(added, covariance, shapes)
+    effect = NamedEffect(
+        name="tooth_error", confidence=1, chance=0, explained=1, parameters=numbers, settings=added.settings()
+    )
+    said = teeth_found([effect], fitted.state)
+    assert said is not None
+    assert said.tooth is not None
+    count = 202 if member == "circular_spline" else 200
+    assert said.member == member
+    assert said.tooth.value == pytest.approx(tooth % (count / 2), abs=1.0)
+    assert said.tooth.interval is not None
+    low, high = said.tooth.interval
+    assert low < said.tooth.value < high < low + 4
+    assert numbers["shift_um"].value == pytest.approx(12.0, rel=0.15)
+
+
+def test_what_only_teeth_have_is_asked_of_teeth_alone() -> None:
+    bench, base = bench_of({})
+    left = Residual(
+        np.random.default_rng(0).standard_normal(len(bench.stacked_blocks())),
+        base.columns,
+        bench.stacked_blocks(),
+    )
+    found = screen(bench, base.state, left, [])
+    toothed = {name for name, _, _ in found.seen}
+    assert {"tooth_error", "mesh_preload", "output_backlash"} <= toothed
+    assert "damaged_tooth" not in toothed
+    plain = state_of(scenario({}, "lumped"))
+    toothless = {name for name, _, _ in screen(bench, plain, left, []).seen}
+    assert "damaged_tooth" in toothless
+    assert not {"tooth_error", "mesh_preload"} & toothless
