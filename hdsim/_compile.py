@@ -5,10 +5,14 @@ another file, and the caller goes on running the old code. Here the stamp of a c
 whose code can end up in compiled functions: the package's ``_*.py`` files and ``kernel.py``.
 
 The cache is beside the code (``__pycache__``); where that is read-only, numba keeps it in the user's cache.
+Where there is none (a service without a home), it is in a folder of this user's among the temporary ones.
 """
 
 from __future__ import annotations
 
+import os
+import stat
+import tempfile
 import warnings
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -16,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core import event
 from numba.core.ccallback import CFunc
 
@@ -64,18 +68,43 @@ def _stamp() -> tuple[float, int]:
     return max(status.st_mtime for status in found), sum(status.st_size for status in found)
 
 
+@cache
+def _spare_folder() -> str:
+    """Folder for compiled code among the temporary ones, this user's alone; "" and a warning without.
+
+    What is kept there is run: a folder that others own or can write to is not used.
+    """
+    user = str(os.getuid()) if hasattr(os, "getuid") else "user"
+    folder = Path(tempfile.gettempdir()) / f"hdsim-compiled-{user}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.lstat()
+        mine = not hasattr(os, "getuid") or (status.st_uid == os.getuid() and not status.st_mode & 0o077)
+        if mine and stat.S_ISDIR(status.st_mode) and os.access(folder, os.W_OK):
+            return str(folder)
+    except OSError:
+        pass
+    warnings.warn(
+        "compiled code cannot be kept, every process compiles anew: neither the package's folder nor the "
+        f"user's cache folder nor {folder} can be written; set NUMBA_CACHE_DIR to one that can",
+        RuntimeWarning,
+        stacklevel=4,
+    )
+    return ""
+
+
 def _keep(compiled: Any) -> None:
     """Keep ``compiled`` on disk, in an entry that also depends on the stamp of all files."""
+    usual = config.CACHE_DIR
     try:
         compiled.enable_caching()
     except RuntimeError:  # numba found no folder that can be written
-        warnings.warn(
-            "compiled code cannot be kept, every process compiles anew: neither the package's folder nor the "
-            "user's cache folder can be written; set NUMBA_CACHE_DIR to one that can",
-            RuntimeWarning,
-            stacklevel=2,
-        )
-        return
+        config.CACHE_DIR = _spare_folder()
+        if not config.CACHE_DIR:
+            return
+        compiled.enable_caching()
+    finally:
+        config.CACHE_DIR = usual
     file = compiled._cache._cache_file
     file._source_stamp = (file._source_stamp, _stamp())
 

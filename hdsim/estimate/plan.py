@@ -76,5 +76,5 @@ def _motor_locked(record: Record, moving: set[str]) -> Plan:
     raise InputError(
         f"{record.name}: with the motor locked, output_angle and output_torque are needed and must vary; "
         f"found {', '.join(sorted(moving)) or 'nothing that varies'} (a load that is measured at the output, "
-        "without inertia between, may be given as output_torque with its sign turned)"
+        "without inertia between, may be given as output_torque with its sign reversed)"
     )

@@ -21,12 +21,12 @@ from hdsim.log.mapping import (
     IntervalMask,
     Mapping,
     Origin,
-    OutlierMask,
     TorqueChannel,
     _Channel,
     side_of,
 )
 from hdsim.log.mapping_source import mapping_of
+from hdsim.log.outliers import outliers
 from hdsim.log.readers.contract import Numbers, Tell, silent
 from hdsim.log.readers.topics import Samples
 from hdsim.recording import Column, Event, Recording, Table
@@ -266,34 +266,6 @@ class Import:
         if self.mapping.description:
             found["description"] = self.mapping.description
         return found
-
-
-def outliers(values: Array, mask: OutlierMask) -> NDArray[np.bool_]:
-    """Samples that stand out from the median of their neighbours, shape (n,); see `OutlierMask`."""
-    from scipy.ndimage import median_filter
-
-    sound = np.isfinite(values)
-    if sound.sum() < 2:
-        return np.zeros(len(values), bool)
-    whole = np.interp(np.arange(len(values)), np.flatnonzero(sound), values[sound])
-    reach = 2 * mask.width_samples + 1
-    padded = np.pad(whole, reach, mode="reflect", reflect_type="odd") if len(whole) > reach else whole
-    if len(padded) == len(whole):
-        return np.zeros(len(values), bool)
-    # Halfway between two samples on either side: on a straight line that is where the sample should be, and
-    # of the pairs more are sound than not beside a spike that is no wider than stated.
-    n = len(whole)
-    pairs = [
-        0.5 * (padded[reach - d : reach - d + n] + padded[reach + d : reach + d + n])
-        for d in range(1, reach + 1)
-    ]
-    off = np.abs(whole - np.median(pairs, axis=0))
-    # 1.4826 times the median deviation estimates a normal distribution's standard deviation.
-    spread = 1.4826 * median_filter(off, mask.window_samples, mode="nearest")
-    steps = np.abs(np.diff(whole))
-    quantum = float(np.min(steps[steps > 0], initial=np.inf))
-    found: NDArray[np.bool_] = (off > mask.threshold * spread) & (off > 3 * quantum)
-    return found
 
 
 def _at(time: Array, other: Array, values: Array) -> Array:

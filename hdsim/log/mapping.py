@@ -267,6 +267,9 @@ class OutlierMask(Parameters):
     """Samples around each one from which the usual distance is taken."""
     threshold: float = Field(8.0, gt=0)
     """Distance that is too far, in standard deviations of a normal distribution of the same spread."""
+    isolated: bool = False
+    """Only what comes back within ``width_samples``, and leaves the range of the five samples on either side
+    by more than that range: steps and steep reversals stay."""
 
 
 Mask = Annotated[IntervalMask | OutlierMask, Field(discriminator="type")]

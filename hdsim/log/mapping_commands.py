@@ -138,6 +138,8 @@ def _show(found: Draft) -> None:
             table.add_row(
                 f"  {key}", _value(answer.value), _coloured(answer.ground, colours), escape(answer.why)
             )
+    for mask in found.masks:
+        table.add_row(f"mask {mask.value['channels'][0]}", "outliers", str(mask.ground), escape(mask.why))
     console().print(table)
 
 

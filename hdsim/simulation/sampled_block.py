@@ -65,7 +65,7 @@ def sampled_block(
         return np.append(plant.state.y, plant.state.step_s or 0.0)
 
     def output_at(t: float, x: Array, u: Array, _: Any) -> Array:
-        numbers = [[t], x, u] if at_once else [[t], x]
+        numbers = [x, u, np.array([t])] if at_once else [x, np.array([t])]
         key = np.concatenate(numbers).tobytes()
         if key not in known:
             if len(known) >= _KEPT:

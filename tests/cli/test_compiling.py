@@ -7,7 +7,9 @@ import os
 import pty
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +46,33 @@ def test_without_any_folder_it_is_compiled_all_the_same(
 ) -> None:
     (tmp_path / "cache").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "cache"))
+    monkeypatch.setattr(compiling, "_spare_folder", cache(compiling._spare_folder.__wrapped__))
     with pytest.warns(RuntimeWarning, match="every process compiles anew.*NUMBA_CACHE_DIR"):
         function = compiling.compiled(twice(tmp_path / "package"))
-    assert function(3.0) == 6.0
+    with warnings.catch_warnings():  # it is said once
+        warnings.simplefilter("error")
+        again = compiling.compiled(twice(tmp_path / "another"))
+    assert function(3.0) == again(3.0) == 6.0
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="who owns a folder is asked where that has an answer")
+def test_without_a_users_cache_it_is_kept_among_the_temporary_files_of_this_user_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cache").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    monkeypatch.setattr(compiling, "_spare_folder", cache(compiling._spare_folder.__wrapped__))
+    assert compiling.compiled(twice(tmp_path / "package"))(3.0) == 6.0
+    (folder,) = (tmp_path / "temporary").iterdir()
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert {path.suffix for path in folder.rglob("*.nb?")} == {".nbc", ".nbi"}
+    folder.chmod(0o777)  # others could put code there
+    monkeypatch.setattr(compiling, "_spare_folder", cache(compiling._spare_folder.__wrapped__))
+    with pytest.warns(RuntimeWarning, match="every process compiles anew"):
+        assert compiling.compiled(twice(tmp_path / "another"))(3.0) == 6.0
 
 
 CODE = """

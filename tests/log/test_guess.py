@@ -13,6 +13,7 @@ from hdsim.log.guess.findings import Draft, Ground
 from hdsim.log.guess.relations import slope, step_of, turn_of, unwound
 from hdsim.log.guess.text import to_text
 from hdsim.log.guess.words import meaning
+from hdsim.log.importing import import_recording
 from hdsim.log.mapping import Mapping
 from hdsim.log.units import unit_of
 from hdsim.scenario import Scenario, load_model
@@ -249,5 +250,52 @@ def test_cycloidal_actuator_whose_side_its_file_does_not_tell(tmp_path):
     stored = load_model(
         Path(__file__).parents[2] / "scenarios" / "mappings" / "cycloidal_torque_ramp.yaml", Mapping
     )
-    own = {"description": "", "longest_gap_s": None}
+    # One sample of the current jumps by 2.3 A and back.
+    assert [(mask.type, mask.channels) for mask in mapping.masks] == [("outliers", ("motor_torque",))]
+    own = {"description": "", "longest_gap_s": None, "masks": ()}
     assert mapping.model_copy(update=own) == stored.model_copy(update=own)
+
+
+def spiked(noise: float, spikes: dict[int, float], seed: int = 3) -> np.ndarray:
+    """A motor torque of friction and inertia, its reversals steep, with noise and spikes at some samples."""
+    torque = 0.1 * np.tanh(SPEED / 0.02) + 0.2 * np.gradient(SPEED, TIME) / 100
+    torque += noise * np.random.default_rng(seed).standard_normal(len(TIME))
+    for at, size in spikes.items():
+        torque[at] += size
+    return torque
+
+
+@pytest.mark.parametrize(
+    ("noise", "spikes", "width"),
+    [
+        (0.002, {100: 0.5, 400: -0.4, 900: 3.0}, 1),
+        (0.002, {100: 0.5, 101: 0.6, 800: -0.5}, 2),
+        (0.0, {700: 0.2, 1200: 0.2}, 1),
+    ],
+)
+def test_spikes_get_a_mask_that_takes_out_no_more(tmp_path, noise, spikes, width):
+    columns = {"time [s]": TIME, "motor_angle [rad]": ANGLE, "motor_torque [Nm]": spiked(noise, spikes)}
+    found = drafted(tmp_path, columns)
+    (mask,) = found.masks
+    assert mask.ground is Ground.SHOWN
+    samples = "one sample" if width == 1 else f"up to {width} samples"
+    assert f"{len(spikes) - (width - 1)} spikes of {samples}" in mask.why
+    mapping = loaded(tmp_path, found)
+    (read,) = mapping.masks
+    assert (read.type, read.channels) == ("outliers", ("motor_torque",))
+    recording = import_recording(tmp_path / "a.csv", mapping)
+    assert set(np.flatnonzero(np.isnan(recording["motor_torque"]))) == set(spikes)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_steps_corners_and_wrapped_angles_get_no_mask(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    stairs = np.repeat(rng.normal(size=30), 50)
+    columns = {
+        "time [s]": TIME,
+        "motor_angle [rad]": np.mod(20 * ANGLE, 2 * np.pi),
+        "output_angle [deg]": np.round(np.degrees(ANGLE / 10), 3),
+        "motor_torque [Nm]": spiked(0.002, {}, seed),
+        "output_torque [Nm]": stairs + 1e-3 * rng.standard_normal(len(TIME)),
+    }
+    assert drafted(tmp_path, columns, ratio="100").masks == []

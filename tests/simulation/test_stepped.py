@@ -186,6 +186,7 @@ def test_a_step_that_fails_leaves_the_plant_at_its_begin() -> None:
 
 
 def test_an_arm_hangs_on_the_output_of_a_stepped_joint_too() -> None:
+    pytest.importorskip("pinocchio")
     one = hdsim.load_scenario(Path(__file__).parents[2] / "scenarios" / "arms" / "joint_2.yaml")
     one = one.with_({"run.duration_s": 0.05, "run.sample_rate_hz": 1000})
     whole = simulate(one)

@@ -13,6 +13,7 @@ from hdsim.log.guess.findings import Answer, Candidate, Channel, Draft, Ground
 from hdsim.log.guess.kinematics import map_motion
 from hdsim.log.guess.readings import stated_unit
 from hdsim.log.guess.relations import moves
+from hdsim.log.guess.spikes import propose_masks
 from hdsim.log.guess.survey import Survey, survey
 from hdsim.log.guess.timing import find_time
 from hdsim.log.guess.torque import map_torques
@@ -77,6 +78,7 @@ def draft(
             channel.keys["sign"] = Answer(int(channel.source.said["sign"]), Ground.SAID)
     _ratio(found, number)
     _gaps(time, found)
+    propose_masks(found)
     _leave_out(found)
     return found
 

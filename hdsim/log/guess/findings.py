@@ -120,6 +120,7 @@ class Draft:
         open: what is left to be said.
         peak_output_nm: largest torque at the output that was seen, N m, for the base scenario.
         longest_gap_s: of the mapping, where there are gaps.
+        masks: of the mapping, each a dictionary of its keys.
     """
 
     title: str
@@ -131,6 +132,7 @@ class Draft:
     open: list[Question] = field(default_factory=list)
     peak_output_nm: float | None = None
     longest_gap_s: Answer | None = None
+    masks: list[Answer] = field(default_factory=list)
 
     def ask(self, text: str, key: str = "", example: str = "") -> None:
         """Leave something open."""

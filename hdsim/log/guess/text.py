@@ -42,6 +42,9 @@ def to_text(draft: Draft, form: Form | None = None) -> str:
         lines += [_line(key, answer, f"{hidden}  ") for key, answer in channel.keys.items()]
     if draft.longest_gap_s is not None:
         lines.append(_line("longest_gap_s", draft.longest_gap_s))
+    for mask in draft.masks:
+        lines += _wrapped(f"Mask of {mask.value['channels'][0]}, {mask.ground}: {mask.why}")
+    lines += to_yaml({"masks": [mask.value for mask in draft.masks]}).splitlines() if draft.masks else []
     lines += _unused(draft.unused)
     lines += [line for question in draft.open for line in _wrapped(f"OPEN: {question}")]
     return "\n".join(lines) + "\n"
