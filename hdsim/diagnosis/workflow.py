@@ -96,7 +96,7 @@ def diagnose(
         scenario: the model; what it commands does not matter, its motion is the measured one.
         holdout: records that only the proof sees; parts of ``measured`` when there are none.
         load: where the load's torque comes from; ``output_torque`` takes what the joint's sensor measures.
-        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: go on in spite of errors in the data.
         black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
         on_step: told what is being done.

@@ -135,7 +135,7 @@ def estimate(
         fix: paths of numbers that do not.
         apart: paths of numbers of a group that move by themselves.
         load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
-        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: go on in spite of errors in the data.
         black_box: learn the same samples by gradient boosting too, to see what is left to be learnt.
         on_step: told what is being done.

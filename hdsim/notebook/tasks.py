@@ -57,7 +57,7 @@ def diagnose(
             dictionary. A log of hdsim needs none.
         holdout: records that only the proof sees; parts of ``measured`` when there are none.
         load: where the load's torque comes from; ``load_torque`` when that is measured, else the scenario.
-        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: go on in spite of errors in the data.
         black_box: learn the same samples by gradient boosting too (``hdsim[baseline]``).
         out: folder for the report, the log and the scenario with what was found (``verdict.scenario``);
