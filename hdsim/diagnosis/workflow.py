@@ -99,7 +99,7 @@ def diagnose(
         scenario: the model; its command does not matter, as the measured motion is prescribed.
         holdout: validation records, used in no fit; parts of ``measured`` when there are none.
         load: source of the load torque; ``output_torque`` takes the reading of the joint's sensor.
-        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline.
         on_step: called with the name of each step.

@@ -36,7 +36,7 @@ class Bench:
     Args:
         training: predictors of the records that fits see.
         holdout: predictors of records that they don't; empty: parts of the training records are held out.
-        zeros: whether a torque sensor has one zero in all records, or one in each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
     """
 
     def __init__(

@@ -139,7 +139,7 @@ def estimate(
         fix: paths of parameters that stay fixed.
         apart: paths of parameters of a group that are estimated by themselves.
         load: source of the load torque; ``load_torque`` when that is measured, else the scenario.
-        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline.
         on_step: called with the name of each step.

@@ -10,8 +10,8 @@ import numpy as np
 from hdsim.estimate.records import Array
 from hdsim.estimate.series import Series
 
-#: Whether a torque sensor has one zero in all records, or was zeroed before each.
-Zeros = Literal["campaign", "record"]
+#: Whether a torque sensor has one zero in all records, was zeroed before each, or is trusted to have none.
+Zeros = Literal["campaign", "record", "trusted"]
 ZEROS: tuple[Zeros, Zeros] = ("campaign", "record")
 #: Standard deviations of a channel's noise by which its zero may move from one record to the next (estimate:
 #: what nobody would see in a record need not be explained).
@@ -22,10 +22,13 @@ def groups(series: Sequence[Series], zeros: Zeros) -> list[list[int]]:
     """Series that share a zero, as their numbers.
 
     A torque sensor, or a current, has one zero in a campaign: what differs between records at constant speed
-    is friction. Angles count from where each record began to count.
+    is friction. Angles count from where each record began to count. A torque that is trusted has no zero, and
+    motion one way tells its Coulomb friction then.
     """
     found: dict[tuple[str, int], list[int]] = {}
     for k, one in enumerate(series):
+        if zeros == "trusted" and one.channel.endswith("torque"):
+            continue
         own = one.record if zeros == "record" or one.channel.endswith("angle") else -1
         found.setdefault((one.channel, own), []).append(k)
     return list(found.values())
@@ -84,4 +87,4 @@ def offset_columns(series: Sequence[Series], training: int, zeros: Zeros) -> Arr
         columns.append(
             np.concatenate([np.full(sizes[k], least / series[k].sigma if k in group else 0.0) for k in seen])
         )
-    return np.column_stack(columns)
+    return np.column_stack(columns) if columns else np.zeros((sum(sizes.values()), 0))

@@ -72,7 +72,7 @@ def bench_for(
         load: where the load's torque comes from.
         readings: successive readings of which means are taken, of the record that is read fastest; of the
             others as many as come in the same time.
-        zeros: whether a torque sensor has one zero in all records, or one in each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
 
     Raises:
         InputError: nothing can be predicted.

@@ -24,6 +24,8 @@ ALONE = 0.8
 WEIGHINGS, ALIKE = 3, 1.5
 #: Part of what is left beside the noise below which the delays that leave it are believed at once.
 ALL = 0.1
+#: Part of what a re-fit leaves beside the noise that numbers which it did not move must explain to be moved.
+MUCH = 0.1
 #: Prior spreads that a number may have gone for a fit to begin at the given one too.
 FAR = 2.0
 #: What a fit may leave, in units of the noise, to count as one that has reached it.
@@ -111,6 +113,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         align(bench, found)
         if reweigh(bench, found) < ALIKE:
             break
+    found = _with_those_left(bench, found)
     _widened(bench, found)
     late = with_delays(bench, found)
     noise = sum(bench.noise_powers.values())
@@ -119,6 +122,35 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         found = late
         reweigh(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
+
+
+def _with_those_left(bench: Bench, found: Fit) -> Fit:
+    """The fit with numbers that were left where they were, where they explain much of what it leaves.
+
+    What a number that is far off leaves lasts as long as the record, and so counts as a few samples, of which
+    nothing can be told; once all numbers have moved together it is gone, and the data tell them.
+    """
+    left = [free for free in found.undetermined if not free.reading]
+    noise = sum(bench.noise_powers.values())
+    before = bench.power(found.predictions)
+    if not left or before <= REACHED * noise:
+        return found
+    readings = replace(found, undetermined=[f for f in found.undetermined if f.reading], beside=None)
+    unknown = Vector(found.state, tuple(left), len(found.state.added))
+    columns = sensitivities(bench, unknown, unknown.start(), found.predictions)
+    rest = bench.stacked(bench.residuals(found.predictions))
+    columns = np.hstack([columns, found.columns, bench.offset_columns()])
+    moves, *_ = np.linalg.lstsq(columns, rest, rcond=1e-6)
+    if float(np.sum((rest - columns @ moves) ** 2)) > before - MUCH * (before - noise):
+        return found
+    frees = at_present(found)
+    whole = fit(bench, found.state, [*frees, *left], prune=False, after=readings, rough=True)
+    if bench.power(whole.predictions) > before - MUCH * (before - noise):
+        return found
+    align(bench, whole)
+    reweigh(bench, whole)
+    # What they leave now says which of them the data do not tell after all.
+    return fit(bench, whole.state, at_present(whole), after=readings)
 
 
 def _widened(bench: Bench, found: Fit) -> None:

@@ -93,7 +93,7 @@ def one_way(bench: Bench) -> list[Problem]:
     speeds = [p.motor_velocity for p in bench.predictors[: bench.training]]
     fastest = max(float(np.max(np.abs(speed))) for speed in speeds)
     back, ahead = (any(np.any(sign * s > SLOW * fastest) for s in speeds) for sign in (-1.0, 1.0))
-    if back == ahead:
+    if back == ahead or bench.zeros == "trusted":
         return []
     return [
         Problem(
@@ -116,7 +116,7 @@ def moving_zeros(bench: Bench, predictions: Sequence[Array]) -> list[Problem]:
         predictions: of the training records, by the final model.
     """
     found: list[Problem] = []
-    if bench.zeros == "record":
+    if bench.zeros != "campaign":
         return found
     together, apart = (
         offsets_of(bench.series, bench.apart(predictions), zeros, drift=False) for zeros in ZEROS

@@ -58,7 +58,7 @@ def diagnose(
             dictionary. A log of hdsim needs none.
         holdout: validation records, used in no fit; parts of ``measured`` when there are none.
         load: source of the load torque; ``load_torque`` when that is measured, else the scenario.
-        zeros: whether a torque sensor has one zero in all records, or was zeroed before each.
+        zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline (``hdsim[baseline]``).
         out: folder for the report, the log and the scenario with the result (``verdict.scenario``);

@@ -50,9 +50,9 @@ def measured_options(command: F) -> F:
             ),
             click.option(
                 "--zeros",
-                type=click.Choice(["campaign", "record"]),
+                type=click.Choice(["campaign", "record", "trusted"]),
                 default="campaign",
-                help="Whether a torque sensor has one zero in all records, or one in each [campaign].",
+                help="Whether torque sensors have one zero in all records, one in each, or none [campaign].",
             ),
             click.option("--force", is_flag=True, help="Continue in spite of errors in the data."),
             click.option(
