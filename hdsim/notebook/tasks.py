@@ -235,8 +235,8 @@ def plants(
     """
     from hdsim.simulation.stepped_batch import SteppedPlants
 
-    loaded = [loaded(scenario) for scenario in scenarios]
-    return SteppedPlants(loaded, motor=motor, output=output, threads=threads)
+    given = [loaded(scenario) for scenario in scenarios]
+    return SteppedPlants(given, motor=motor, output=output, threads=threads)
 
 
 def _file_for(scenario: AnyScenario, out: str | Path | None) -> str | Path | None:
