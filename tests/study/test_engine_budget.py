@@ -1,4 +1,5 @@
 import math
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,19 @@ def test_parts_of_a_linear_drive_are_the_analytic_ones_and_add_up():
     assert parts["wind_up"].share.value == pytest.approx(wind_up + sag / 2, rel=0.01)
     assert parts["friction_and_control"].share.value == pytest.approx(sag / 2, rel=0.05)
     assert found.rest + sum(part.share.value for part in found.parts) == pytest.approx(found.whole, abs=1e-9)
+
+
+def test_a_budget_on_an_executor_is_the_budget_in_this_process():
+    scenario, told = Scenario.model_validate(LINEAR), []
+    alone = error_budget(scenario, shares=False)
+    with ThreadPoolExecutor(2) as pool:
+        there = error_budget(
+            scenario, shares=False, pool=pool, width=2, on_progress=lambda *done: told.append(done)
+        )
+    numbers = [[(p.cause.name, p.removed, p.alone) for p in found.parts] for found in (alone, there)]
+    assert numbers[0] == numbers[1]
+    assert (there.whole, there.rest) == (alone.whole, alone.rest)
+    assert told == [(k, alone.runs) for k in range(2, alone.runs + 1)]
 
 
 def test_backlash_is_the_gap_when_a_load_closes_it():
