@@ -24,7 +24,7 @@ def test_each_gap_grows_and_the_structure_stays(mesh: dict[str, Any], growth: fl
     assert worn.half_gaps_m == pytest.approx((1 + growth) * new.half_gaps_m)
     torque = np.array([3.0, 20.0, 52.0])
     assert worn.structure_wind_up(torque) == pytest.approx(new.structure_wind_up(torque), rel=1e-12)
-    # Where all teeth of the arcs touch, the mesh turns by what their gaps have grown, on average; along a flank
+    # Where all teeth of the arcs touch, the mesh turns by what their gaps have grown; along a flank
     # it is the part that is under load there which counts.
     more = growth * float(new.half_gaps_m.mean()) / new.lever_m
     assert worn.wind_up(150.0) - new.wind_up(150.0) == pytest.approx(
