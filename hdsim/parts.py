@@ -174,6 +174,9 @@ class Builder(Protocol):
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh, as an angle at the output; below zero teeth are pressed."""
 
+    def grow_gaps(self, growth: float) -> None:
+        """Widen each tooth's own half-gap by a part of itself; a mesh without teeth has none."""
+
     def odd_tooth(self, tooth: OddTooth) -> None:
         """Let a tooth differ from the drawn ones; a mesh without teeth has none."""
 

@@ -35,7 +35,7 @@ def teeth_found(effects: Sequence[NamedEffect], state: State) -> TeethFound | No
     for effect in effects:
         if effect.name == "tooth_error" and "tooth" in effect.parameters:
             _place(found, effect, state)
-        elif effect.name in _GAPS and isinstance(state.drive.mesh, ToothedMesh):
+        elif effect.name in (*_GAPS, "flank_wear") and isinstance(state.drive.mesh, ToothedMesh):
             _gap(found, effect, state)
         elif effect.name == "output_backlash" and isinstance(state.drive.mesh, LumpedMesh):
             _play(found, effect, state)
@@ -64,7 +64,7 @@ def _place(found: TeethFound, effect: NamedEffect, state: State) -> None:
 def _gap(found: TeethFound, effect: NamedEffect, state: State) -> None:
     """The mean half-gap of a mesh with teeth."""
     mesh, drive = state.drive.mesh, state.drive
-    field, part = _GAPS[effect.name]
+    field, part = _GAPS.get(effect.name, ("growth", 0.0))
     start = mesh.gap_factor * (
         mesh.half_gap_m
         if mesh.half_gap_m is not None
@@ -72,7 +72,10 @@ def _gap(found: TeethFound, effect: NamedEffect, state: State) -> None:
     )
     change = effect.parameters[field]
     ends = [change.value, *(change.interval or ())]
-    gaps = [1e6 * (start + 2.0 * part * half_gap_of_play(drive, end * _ARCMIN)) for end in ends]
+    if effect.name == "flank_wear":
+        gaps = [1e6 * start * (1.0 + end) for end in ends]
+    else:
+        gaps = [1e6 * (start + 2.0 * part * half_gap_of_play(drive, end * _ARCMIN)) for end in ends]
     found.half_gap_um = FittedNumber(
         value=gaps[0], interval=(min(gaps[1:]), max(gaps[1:])) if gaps[1:] else None, start=1e6 * start
     )

@@ -36,6 +36,7 @@ class Contributions:
     external: dict[str, int] = field(default_factory=dict)
     housing: tuple[int, float] | None = None
     half_gap_rad: float = 0.0
+    gap_growth: float = 0.0
     odd_teeth: list[OddTooth] = field(default_factory=list)
     play: bool = False
 
@@ -95,6 +96,10 @@ class Contributed:
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh (rad at the output); see ``hdsim.parts.Builder.widen_gap``."""
         self._given.half_gap_rad += half_gap_rad
+
+    def grow_gaps(self, growth: float) -> None:
+        """Add to the growth of the gaps; see ``hdsim.parts.Builder.grow_gaps``."""
+        self._given.gap_growth += growth
 
     def odd_tooth(self, tooth: OddTooth) -> None:
         """Let a tooth differ; see ``hdsim.parts.Builder.odd_tooth``."""

@@ -23,6 +23,7 @@ def teeth_of(
     *,
     extra_half_gap_rad: float,
     seed: int,
+    gap_growth: float = 0.0,
     table_for: str | None = None,
 ) -> Teeth:
     """``Teeth``, kept for the next model: a fit makes hundreds that differ in numbers that no tooth sees.
@@ -35,25 +36,26 @@ def teeth_of(
         wind_ups: likewise.
         extra_half_gap_rad: likewise.
         seed: likewise.
+        gap_growth: likewise.
         table_for: fingerprint of the teeth that are taken from a table; others are summed, for a table of
             them would serve once. As the mesh says when None.
     """
+    given: Any = {"extra_half_gap_rad": extra_half_gap_rad, "seed": seed, "gap_growth": gap_growth}
     if table_for is not None:
-        given: Any = {"extra_half_gap_rad": extra_half_gap_rad, "seed": seed}
         summed = teeth_of(drive, _as(TeethMesh, mesh), wind_ups, **given)
         if summed.fingerprint != table_for:
             return summed
         return teeth_of(drive, _as(TabulatedMesh, mesh), wind_ups, **given)
     if isinstance(mesh.contact, TableLawParameters):
         # Its file may change between two drives of one process.
-        found = Teeth(drive, mesh, wind_ups, extra_half_gap_rad=extra_half_gap_rad, seed=seed)
+        found = Teeth(drive, mesh, wind_ups, **given)
         found.warn()
         return found
     seen = mesh.model_copy(update={"ring": "dynamic", "damping_nm_s_per_rad": 0.0})
     torsion = drive.torsion.model_copy(update={"damping_nm_s_per_rad": 0.0})
     unseen: dict[str, Any] = {"preset": None, "friction": Friction(), "inertia": Inertia()}
     bare = drive.model_copy(update=unseen | {"torsion": torsion, "mesh": seen})
-    found = _kept_teeth(bare, tuple(wind_ups), extra_half_gap_rad, seed)
+    found = _kept_teeth(bare, tuple(wind_ups), extra_half_gap_rad, seed, gap_growth)
     found.warn()
     return found
 
@@ -68,7 +70,12 @@ def _as(kind: type[TeethMesh | TabulatedMesh], mesh: ToothedMesh) -> ToothedMesh
 
 @lru_cache(maxsize=16)
 def _kept_teeth(
-    drive: Drive, wind_ups: tuple[Callable[[Array], Array], ...], extra_half_gap_rad: float, seed: int
+    drive: Drive,
+    wind_ups: tuple[Callable[[Array], Array], ...],
+    extra_half_gap_rad: float,
+    seed: int,
+    gap_growth: float,
 ) -> Teeth:
     assert isinstance(drive.mesh, TeethMesh | TabulatedMesh)
-    return Teeth(drive, drive.mesh, wind_ups, extra_half_gap_rad=extra_half_gap_rad, seed=seed)
+    given: Any = {"extra_half_gap_rad": extra_half_gap_rad, "seed": seed, "gap_growth": gap_growth}
+    return Teeth(drive, drive.mesh, wind_ups, **given)

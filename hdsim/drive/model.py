@@ -148,6 +148,7 @@ class Model(Contributed):
             self._given.wind_ups,
             extra_half_gap_rad=self._given.half_gap_rad,
             seed=self.seed,
+            gap_growth=self._given.gap_growth,
             table_for=self._table_for,
         )
         self.teeth = with_odd_teeth(self.teeth, self._given.odd_teeth)

@@ -68,6 +68,7 @@ class Teeth:
         extra_half_gap_rad: half-gap beyond the surfaces' (wear), or less than theirs (preload), rad at the
             output.
         seed: seed of surfaces and pitch errors.
+        gap_growth: part of its own gap by which each tooth's is wider than when it was calibrated.
 
     Attributes:
         parameters: the compiled mesh's numbers.
@@ -87,6 +88,7 @@ class Teeth:
         *,
         extra_half_gap_rad: float,
         seed: int,
+        gap_growth: float = 0.0,
     ) -> None:
         self.drive = drive
         self.mesh = mesh
@@ -126,6 +128,7 @@ class Teeth:
         new = header.copy()
         teeth = [*self._blocks]
         self._place_structure(wind_ups)
+        self._grow_gaps(gap_growth)
         header[place.EXTRA_GAP] = new[place.EXTRA_GAP] = extra_gap
         alone = np.concatenate([new, *teeth[1:]])
         self.fingerprint = sha256(alone.tobytes()).hexdigest()
@@ -166,6 +169,7 @@ class Teeth:
         """Each tooth's half-gap as cells over the angle from the major axis (one cell: a constant)."""
         mesh = self.mesh
         header = self._header
+        before = len(self._blocks)
         if mesh.half_gap_m is not None or not mesh.gap_along_flank:
             if mesh.half_gap_m is not None:
                 self.half_gaps_m = np.full(self.count, mesh.gap_factor * mesh.half_gap_m)
@@ -188,6 +192,7 @@ class Teeth:
             self.half_gaps_m = gaps.mean(axis=1)
         header[place.GAP_CELLS] = cells.shape[1]
         header[place.GAP_AT] = self._place(np.ascontiguousarray(cells))
+        self._gap_blocks = self._blocks[before:]
 
     def _place_engagement(self) -> None:
         header = self._header
@@ -223,6 +228,12 @@ class Teeth:
                 f"no clearance between 1e-8 and 1e-2 m engages {engagement.share:.0%} of the teeth"
             )
         return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
+
+    def _grow_gaps(self, growth: float) -> None:
+        """Widen each tooth's own gap by a part of itself."""
+        for block in self._gap_blocks:
+            block *= 1.0 + growth
+        self.half_gaps_m = (1.0 + growth) * self.half_gaps_m
 
     def close_gaps(self, numbers: Array) -> None:
         """Close the surfaces' gaps in a built mesh; the structure keeps the stiffness that it was calibrated

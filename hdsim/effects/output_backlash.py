@@ -54,6 +54,8 @@ class OutputBacklash(Effect):
                 # Taken up later than within a seventh of the torque it would be any compliance that stiffens.
                 (Shape("coefficient_per_nm", (8.0, 32.0), "torque_nm", least=7.0),),
                 label="taken up gradually",
+                # Teeth whose gaps differ take theirs up gradually by themselves.
+                mesh="toothless",
             )
             for part in _PARTS[1:]
         ),

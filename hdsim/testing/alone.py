@@ -67,6 +67,7 @@ class Collector:
         self.states: list[State] = []
         self.compliances: list[Callable[[Any], Any]] = []
         self.half_gap = 0.0
+        self.gap_growth = 0.0
         self.odd_teeth: list[OddTooth] = []
         self.moving_housing: tuple[int, float] | None = None
         self.sensors: dict[str, Any] = {}
@@ -110,6 +111,10 @@ class Collector:
     def widen_gap(self, half_gap_rad: float) -> None:
         """See ``hdsim.parts.Builder.widen_gap``."""
         self.half_gap += half_gap_rad
+
+    def grow_gaps(self, growth: float) -> None:
+        """See ``hdsim.parts.Builder.grow_gaps``."""
+        self.gap_growth += growth
 
     def odd_tooth(self, tooth: OddTooth) -> None:
         """See ``hdsim.parts.Builder.odd_tooth``."""

@@ -149,7 +149,7 @@ def _drawn(number: int, seed: int, rng: np.random.Generator) -> Try:
         factor = NARROWER if turn % 4 == 3 else log_uniform(rng, *WIDER)
         teeth = replace(plain, gap=factor)
         plant = behind_the_same_structure(d, plain, teeth)
-        names = frozenset({"output_backlash" if factor > 1 else "mesh_preload"})
+        names = frozenset({"flank_wear", "output_backlash" if factor > 1 else "mesh_preload"})
     elif what == "tooth":
         effects, truth = _tooth(d, turn, rng)
         names = frozenset({"tooth_error"})

@@ -30,7 +30,7 @@ def test_every_effect_of_the_catalogue_that_can_be_fitted_is_hidden_and_none_has
         if any(fitting.mesh != "toothed" for fitting in effect.fittings)
     }
     assert named >= asked
-    of_teeth = {"mesh_preload", "tooth_error"}
+    of_teeth = {"flank_wear", "mesh_preload", "tooth_error"}
     assert {name for name, effect in catalogue().items() if effect.fittings} - asked == of_teeth
     assert all(h.limit for h in (*EFFECTS, *OUTSIDE))
     assert {name for kind in KINDS_OF for name in kind} == {h.name for h in EFFECTS}

@@ -54,6 +54,7 @@ UNITS = {
     "extra_static_nm": "N m",
     "friction_nm": "N m",
     "heat_capacity_j_per_k": "J/K",
+    "growth": "",
     "interference_arcmin": "arcmin",
     "motor_kg_m": "kg m",
     "motor_phase_deg": "deg",

@@ -15,6 +15,7 @@ EXPECTED = {
     "damaged_tooth.amplitude_arcmin": "arcmin",
     "damaged_tooth.position_deg": "deg",
     "damaged_tooth.width_deg": "deg",
+    "flank_wear.growth": "",
     "flexspline_stiffening.coefficient_per_nm": "1/(N m)",
     "flexspline_stiffening.stiffness_nm_per_rad": "N m/rad",
     "input_coulomb_viscous.coulomb_nm": "N m",
