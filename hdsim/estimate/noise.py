@@ -22,6 +22,8 @@ from hdsim.estimate.records import Array, Mask
 ORDERS = (4, 6, 8)
 #: Part of a step by which differences of a quantised channel may miss its multiples: rounding in a text file.
 ROUNDING = 0.05
+#: Parts of the largest reading below which two are one: rounding in double and in single precision.
+ROUNDED = (1e-12, 2e-7)
 
 
 def noise_floor(values: Array, trusted: Mask) -> float:
@@ -84,11 +86,20 @@ def noise_of_means(
 def quantisation_step(values: Array) -> float:
     """Step q of which all differences between readings are multiples, in their unit; 0 where there is none.
 
+    Readings of one step may differ by what single precision, or a conversion of their unit, rounds.
+
     Args:
         values: shape (n,), trusted readings.
     """
-    steps = np.diff(np.unique(values))
-    steps = steps[steps > 1e-12 * float(np.max(np.abs(values), initial=0.0))]
+    gaps = np.diff(np.unique(values))
+    for rounded in ROUNDED:
+        step = _step(gaps[gaps > rounded * float(np.max(np.abs(values), initial=0.0))])
+        if step > 0.0:
+            return step
+    return 0.0
+
+
+def _step(steps: Array) -> float:
     if len(steps) < 2:
         return 0.0
     # The median of the smallest ones: a single one may have lost digits.

@@ -29,6 +29,15 @@ def test_a_step_is_found_from_the_readings_alone(step, seed):
     assert quantisation_step(values) == pytest.approx(step, rel=1e-6)
 
 
+@pytest.mark.parametrize("step", [1e-5, 1e-4, 1e-3])
+def test_a_step_is_found_in_readings_that_were_rounded_again(step):
+    values = np.round(slow(2) / step) * step
+    single = values.astype(np.float32).astype(float)
+    shaken = values * (1.0 + 1e-9 * np.random.default_rng(5).standard_normal(6000))
+    assert quantisation_step(single) == pytest.approx(step, rel=0.01)
+    assert quantisation_step(shaken) == pytest.approx(step, rel=0.01)
+
+
 def test_continuous_readings_have_no_step():
     values = slow(1) + 1e-4 * np.random.default_rng(0).standard_normal(6000)
     assert quantisation_step(values) == 0.0
