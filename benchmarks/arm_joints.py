@@ -2,10 +2,10 @@
 
     python benchmarks/arm_joints.py [draws] [first seed]
 
-The arm is MuJoCo's (``mj_inverse`` at the motion of the output); the drive is written in NumPy: rigid, with
-friction and one thing that its model has not: the Coulomb part of that, a motor's ripple, a kinematic error
-(with its reaction on the motor, by virtual work), or nothing. Each line says what was hidden and what
-was named; the last counts. Compared are motor torque and output angle.
+The arm is a forward simulation of MuJoCo with a controller in each joint (``tests/estimate/arm_forward.py``);
+the drive of one joint is rigid, with friction and one thing that its model has not: the Coulomb part of that,
+a motor's ripple, a kinematic error, or nothing. Each line says what was hidden and what was named; the last
+counts. Compared are motor torque and output angle.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "estimate"))
 
+import arm_forward as forward
 import arm_plant as plant
 
 import hdsim
@@ -37,34 +38,36 @@ NOISE = {"motor_torque": 2e-3, "output_angle": 5e-6, "joint": 1e-5}
 
 def record(joint: int, hidden: str, seed: int) -> Record:
     """Ten seconds of one joint's motor and output, and the encoders of all others."""
-    t, motion = plant.motions(10.0, seed)
     rng = np.random.default_rng([seed, joint, 5])
-    angle, speed, rate = plant.RATIO * motion[:, :, joint]
-    error, slope, bend = np.zeros((3, len(t)))
-    if hidden == "kinematic error":
-        size, order, phase = rng.uniform(6e-5, 3e-4), rng.choice([2.0, 4.0]), rng.uniform(0, 2 * np.pi)
-        error, slope = size * np.sin(order * angle + phase), size * order * np.cos(order * angle + phase)
-        bend = -(order**2) * error
-    moved = motion.copy()
-    moved[0, :, joint] += error
-    moved[1, :, joint] += slope * speed
-    moved[2, :, joint] += slope * rate + bend * speed**2
-    carried = plant.carried(moved)[:, joint]
-    torque = carried * (1 / plant.RATIO + slope) + plant.ROTOR * rate + plant.VISCOUS * speed
-    coulomb = rng.uniform(0.02, 0.1) if hidden == "friction" else plant.COULOMB
-    torque = torque + coulomb * np.tanh(speed / 0.5)
-    if hidden == "ripple":
-        order = rng.choice([1.0, 6.0, 12.0])
-        torque = torque + rng.uniform(0.005, 0.03) * np.sin(order * angle + rng.uniform(0, 2 * np.pi))
-    channels = {"motor_angle": angle, "motor_torque": torque, "output_angle": moved[0, :, joint]}
-    noisy = {c: v + NOISE.get(c, 0.0) * rng.standard_normal(len(t)) for c, v in channels.items()}
+    drawn = {
+        "kinematic error": lambda: {
+            "error_rad": rng.uniform(6e-5, 3e-4),
+            "error_order": rng.choice([2.0, 4.0]),
+            "phase": rng.uniform(0, 2 * np.pi),
+        },
+        "friction": lambda: {"coulomb_nm": rng.uniform(0.02, 0.1)},
+        "ripple": lambda: {
+            "ripple_order": rng.choice([1.0, 6.0, 12.0]),
+            "ripple_nm": rng.uniform(0.005, 0.03),
+            "phase": rng.uniform(0, 2 * np.pi),
+        },
+        "nothing": dict,
+    }[hidden]()
+    run = forward.run(joint, forward.Hidden(**drawn), 10.0, seed)
+    channels = {
+        "motor_angle": run["motor_angle"],
+        "motor_torque": run["motor_torque"],
+        "output_angle": run["joints"][:, joint],
+    }
+    count = len(run["time"])
+    noisy = {c: v + NOISE.get(c, 0.0) * rng.standard_normal(count) for c, v in channels.items()}
     names = [f"joint_{k + 1}" for k in range(6)]
     others = {
-        name: motion[0, :, k] + NOISE["joint"] * rng.standard_normal(len(t))
+        name: run["joints"][:, k] + NOISE["joint"] * rng.standard_normal(count)
         for k, name in enumerate(names)
         if k != joint
     }
-    return Record(names[joint], t, noisy, joints=others)
+    return Record(names[joint], run["time"], noisy, joints=others)
 
 
 def main() -> None:

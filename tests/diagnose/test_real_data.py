@@ -19,12 +19,19 @@ FRICTION_NM = {1: 2.66, 3: 2.17, 4: 2.44, 6: 1.18, 7: 1.14}
 #: What least squares of the motor's torque leave in the held-out stretches of both records, N m at the motor:
 #: over velocity and its sign of a spline with a knot each 72 ms, beside inertia and the sensor's torque.
 REGRESSED_NM = {1: 0.0093, 3: 0.0100, 4: 0.0101, 6: 0.0048, 7: 0.0083}
+#: Most that may be left of the gap. Joint 6 turns one way in most of its held-out stretches: there friction
+#: is an offset, and no gap.
+LEFT = {1: 0.25, 3: 0.28, 4: 0.25, 6: 0.70, 7: 0.26}
 #: Names of one thing for these data: friction that turns with the direction.
 FRICTIONS = {"input_coulomb_viscous", "lugre_friction", "load_dependent_loss", "stribeck_friction"}
 #: Amplitudes of SOURCE.md, N m at the output: of the torque sensor's order 2, of the motor's order 12.
 SENSORS = ("sensors", "output_torque.ripple.0", "amplitude_nm", 2.0)
 MOTOR = ("motor_torque_ripple", "components.0", "cogging_nm", 12.0)
-RIPPLE_NM = {1: [(*SENSORS, 0.167, 1.0)], 7: [(*SENSORS, 0.054, 1.0), (*MOTOR, 1.2, 100.0)]}
+RIPPLE_NM = {
+    1: [(*SENSORS, 0.167, 1.0)],
+    3: [(*SENSORS, 0.084, 1.0)],
+    7: [(*SENSORS, 0.054, 1.0), (*MOTOR, 1.2, 100.0)],
+}
 
 #: Lost motion of the actuator's loops at zero torque, as read off the recording.
 LOST_MOTION_DEG = 3.2
@@ -54,8 +61,8 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
     assert {effect.name for effect in found.effects[1:]} <= {"sensors", "motor_torque_ripple"}
     gap = found.gap["motor_torque"]
     assert gap.after < 1.05 * REGRESSED_NM[joint]
-    # Joint 6 turns one way in most of its held-out stretches: there friction is an offset, and no gap.
-    assert joint == 6 or gap.after < gap.before / 3
+    assert gap.after < LEFT[joint] * gap.before
+    assert gap.after < 1.3 * gap.regression
     # Of the bound of the search nothing is told: the acceleration is the motion's, not its readings' errors'.
     inertia = found.parameters["drive.inertia.motor_kg_m2"]
     assert inertia.value > 0.1 * inertia.start
@@ -65,6 +72,20 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
         ripple = next(effect for effect in found.effects if effect.name == name)
         assert ripple.parameters[f"{place}.order"].value == order
         assert ratio * ripple.parameters[f"{place}.{size}"].value == pytest.approx(amplitude, rel=0.2)
+    orders = {(one.channel, round(one.order, 2)): one for one in found.orders}
+    if joint == 4:
+        # Located, and not named: what is there wanders from period to period.
+        order = orders["output_torque", 2.0]
+        assert order.steady < 0.25
+        assert "sensors" not in {effect.name for effect in found.effects}
+        assert all(f"opti_traj_testing{k}" in order.sentence for k in (1, 2))
+    else:
+        assert joint == 6 or orders["output_torque", 2.0].growth == "same"
+    if joint == 7:
+        assert orders["output_torque", 7.0].growth == "grows"
+        assert orders["motor_torque", 12.0].growth == "same"
+        assert orders["motor_torque", 12.0].steady > 0.9
+    assert any(p.kind == "slips" for p in found.data_problems)
     if joint in (6, 7):
         # The current is logged late beside the angle: 12 periods a turn would be blurred without saying so.
         assert any(p.kind == "clock" and p.channel == "motor_torque" for p in found.data_problems)

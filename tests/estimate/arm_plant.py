@@ -48,7 +48,13 @@ def model(folder: Path, joint: int, payload: float = 2.0, coulomb: float = 0.06)
 
 def motions(seconds: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Times (n,), and angle, velocity and acceleration of all joints, (3, n, 6): two sines each."""
-    t, rng = np.arange(round(seconds * RATE)) / RATE, np.random.default_rng(seed)
+    t = np.arange(round(seconds * RATE)) / RATE
+    return t, at(t, seed)
+
+
+def at(t: np.ndarray, seed: int) -> np.ndarray:
+    """The same motion at other times (n,): angle, velocity and acceleration of all joints, (3, n, 6)."""
+    rng = np.random.default_rng(seed)
     found = np.zeros((3, len(t), 6))
     for k in range(6):
         for size, hertz in ((rng.uniform(0.4, 0.7), rng.uniform(0.1, 0.25)), (0.15, rng.uniform(0.3, 0.6))):
@@ -56,22 +62,28 @@ def motions(seconds: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
             found[0, :, k] += size * np.sin(w * t + phase)
             found[1, :, k] += size * w * np.cos(w * t + phase)
             found[2, :, k] -= size * w * w * np.sin(w * t + phase)
-    return t, found
+    return found
 
 
-def carried(motion: np.ndarray) -> np.ndarray:
-    """Torques of all joints (n, 6), by MuJoCo, with the payload on the tool."""
+def arm() -> mujoco.MjModel:
+    """The arm with the payload on its tool."""
     inertial = f"<mass value='{MASS}'/><origin xyz='0 0 {LEVER}'/>"
     inertial += "<inertia ixx='1e-9' iyy='1e-9' izz='1e-9' ixy='0' ixz='0' iyz='0'/>"
     text = URDF.read_text(encoding="utf-8").replace(
         '<link name="tool"/>', f"<link name='tool'><inertial>{inertial}</inertial></link>"
     )
-    arm = mujoco.MjModel.from_xml_string(text)
-    arm.opt.gravity[:] = (0.0, 0.0, -9.80665)
-    arm.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    data, found = mujoco.MjData(arm), []
+    found = mujoco.MjModel.from_xml_string(text)
+    found.opt.gravity[:] = (0.0, 0.0, -9.80665)
+    found.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    return found
+
+
+def carried(motion: np.ndarray) -> np.ndarray:
+    """Torques of all joints (n, 6), by MuJoCo, with the payload on the tool."""
+    model = arm()
+    data, found = mujoco.MjData(model), []
     for data.qpos[:], data.qvel[:], data.qacc[:] in zip(*motion, strict=True):
-        mujoco.mj_inverse(arm, data)
+        mujoco.mj_inverse(model, data)
         found.append(data.qfrc_inverse.copy())
     return np.array(found)
 
