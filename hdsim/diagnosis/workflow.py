@@ -4,30 +4,36 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from hdsim.diagnosis.collect import collect
 from hdsim.diagnosis.curve import CurveFit, fit_curve
-from hdsim.diagnosis.decide import Decision, decide
+from hdsim.diagnosis.decide import decide
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.growth import tracked
-from hdsim.diagnosis.locate import SHARP
 from hdsim.diagnosis.name import Named
-from hdsim.diagnosis.remainder import remainder
 from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.search import Search, Stage, search
+from hdsim.diagnosis.sentences import (
+    effect_words,
+    fitted_number,
+    located,
+    named_effects,
+    numbers_off,
+    rest_words,
+    without_a_name,
+    without_a_place,
+)
 from hdsim.diagnosis.teeth import teeth_found
-from hdsim.diagnosis.verdict import Located, NamedEffect, Verdict
-from hdsim.effects import catalogue
+from hdsim.diagnosis.verdict import Verdict
 from hdsim.errors import InputError
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Check
-from hdsim.estimate.fit import Fit, added_spreads, base_intervals
-from hdsim.estimate.found import DataProblem, FittedNumber
-from hdsim.estimate.numbers import Interval
+from hdsim.estimate.fit import Fit, base_intervals
+from hdsim.estimate.found import DataProblem
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
@@ -40,7 +46,7 @@ from hdsim.estimate.short_cut import short_cut_error
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.thin import readings_of_means
-from hdsim.estimate.write import fitted_numbers, scenario_changes
+from hdsim.estimate.write import scenario_changes
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -48,8 +54,6 @@ if TYPE_CHECKING:
 
 #: Part of a curve's promise that held-out data must show: nearer to all of it than to none.
 HALF = 0.5
-#: Least part of the structure that is said to follow another shape than its law's.
-LEAST_REST = 0.02
 
 
 @dataclass
@@ -210,10 +214,10 @@ def _diagnosed(
         if not off:
             decision.kind = "nothing"
     common: dict[str, Any] = {
-        "parameters": {i.name: _number(i) for i in intervals},
+        "parameters": {i.name: fitted_number(i) for i in intervals},
         "moved": [i.name for i in off],
         "gap": gap,
-        "located": _located(found.stages),
+        "located": located(found.stages),
         "orders": orders,
         "data_problems": [DataProblem(**vars(problem)) for problem in problems],
         "not_tried": found.stages[0].screening.skipped if found.stages[0].screening else {},
@@ -227,17 +231,17 @@ def _diagnosed(
     patterned = evidence.left_chance <= RULES.chance and evidence.left >= RULES.structured
     noisy = evidence.rest is not None and evidence.rest.times_noise > RULES.rest
     if unknown and (evidence.laws or patterned or not noisy):
-        verdict = _without_a_name(found.stages, evidence, common)
+        verdict = without_a_name(found.stages, evidence, common)
     elif unknown:
-        verdict = _without_a_place(bench, found.fit, common)
+        verdict = without_a_place(bench, found.fit, common)
     elif named:
-        effects = _effects(named, decision, current)
-        words = " and ".join(_words(effect) for effect in effects)
-        sentence = f"The model is missing {words}.{_rest_words(found.stages[-1], evidence)}"
+        effects = named_effects(named, decision, current)
+        words = " and ".join(effect_words(effect) for effect in effects)
+        sentence = f"The model is missing {words}.{rest_words(found.stages[-1], evidence)}"
         teeth = teeth_found(effects, current.state)
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
-        verdict = _numbers_off(off, common, sure=bool(moved))
+        verdict = numbers_off(off, common, sure=bool(moved))
     else:
         said = "The data show no effect that is missing from the model."
         verdict = Verdict(verdict="nothing", sentence=said, **common)
@@ -253,109 +257,3 @@ def _only(bench: Bench, base: Refit, found: Search, believed: Sequence[int]) -> 
         return base.fit
     added = tuple(found.fit.state.added[k] for k in believed)
     return together(bench, found.fit, replace(found.fit.state, added=added))
-
-
-def _without_a_name(stages: Sequence[Stage], evidence: Evidence, common: Mapping[str, Any]) -> Verdict:
-    place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
-    nearest = ", ".join(law.name.replace("_", " ") for law in evidence.laws)
-    share = f"{100 * evidence.explained:.0f} % of the systematic residual"
-    said = f"; closest: {nearest}, {share}" if nearest else ""
-    return Verdict(
-        verdict="unknown",
-        sentence="An effect is missing, and none of the catalogue explains enough to be identified: "
-        f"{100 * place.share:.0f} % of the residual of {place.channel} is a function of "
-        f"{place.coordinate.replace('_', ' ')}{said}.",
-        suspects={law.name: round(law.gain, 3) for law in evidence.laws},
-        **common,
-    )
-
-
-def _without_a_place(bench: Bench, last: Fit, common: Mapping[str, Any]) -> Verdict:
-    rest = remainder(bench, last.predictions)
-    assert rest is not None  # the evidence has said so
-    return Verdict(
-        verdict="unknown",
-        sentence="An effect is missing that no effect of the catalogue explains: the residual of "
-        f"{rest.channel} in {rest.record} reaches {rest.times_noise:.2g} times its noise, most of it "
-        f"between {rest.start_s:.3g} and {rest.end_s:.3g} s, and is a function of no regressor that "
-        "these data repeat.",
-        remainder=rest,
-        **common,
-    )
-
-
-def _rest_words(last: Stage, evidence: Evidence) -> str:
-    """What the names leave, with its place; nothing where it may be chance."""
-    left = 1.0 - evidence.explained
-    if evidence.left_chance > RULES.chance or left < LEAST_REST or not last.location.places:
-        return ""
-    place = last.location.places[0]
-    coordinate = place.coordinate.replace("_", " ")
-    return f" {100 * left:.0f} % of the systematic residual remains, a function of the {coordinate}."
-
-
-def _numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:
-    changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
-    said = f"parameters of the model are wrong: {', '.join(changes)}."
-    if not sure:
-        said = f"a parameter of the model is wrong, most simply {' or '.join(i.name for i in off)}."
-    return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
-
-
-def _number(interval: Interval) -> FittedNumber:
-    bounds = (interval.low, interval.high) if interval.determined else None
-    return FittedNumber(value=interval.value, interval=bounds, start=interval.start, tied_to=interval.tied_to)
-
-
-def _effects(named: Sequence[Named], decision: Decision, final: Fit) -> list[NamedEffect]:
-    known = catalogue()
-    found = []
-    chances = [decision.confidence[k] for k in decision.names]
-    spreads = added_spreads(final)
-    for one, confidence, (added, covariance, shapes) in zip(named, chances, spreads, strict=True):
-        confused = known[one.name].signature.confused_with
-        found.append(
-            NamedEffect(
-                name=one.name,
-                title=" ".join(
-                    [known[one.name].title, f"({added.fitting.label})" if added.fitting.label else ""]
-                ).strip(),
-                confidence=confidence,
-                chance=one.chance,
-                explained=one.share,
-                parameters=fitted_numbers(added, covariance, shapes),
-                settings=added.settings(),
-                indistinguishable_from=list(one.group),
-                separated_by={
-                    other: confused.get(other) or known[other].signature.confused_with.get(one.name, "")
-                    for other in one.group
-                },
-            )
-        )
-    return found
-
-
-def _words(effect: NamedEffect) -> str:
-    others = [catalogue()[name].title for name in effect.indistinguishable_from]
-    alike = f"{effect.title} (not distinguishable with these data from {', '.join(others)})"
-    return alike if others else effect.title
-
-
-def _located(stages: Sequence[Stage], most: int = 6) -> list[Located]:
-    found = []
-    for stage in stages:
-        best: dict[tuple[str, str], Located] = {}
-        for place in stage.location.places:
-            key = (place.coordinate, place.channel)
-            if key in best or place.share < 0.02 or (len(best) >= most and place.coordinate != SHARP):
-                continue
-            orders = [line.order for line in stage.location.lines if line.channel == place.channel]
-            best[key] = Located(
-                stage=stage.title,
-                coordinate=place.coordinate,
-                channel=place.channel,
-                share=round(place.share, 4),
-                orders=orders if place.coordinate == SHARP else [],
-            )
-        found += list(best.values())
-    return found

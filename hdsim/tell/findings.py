@@ -17,8 +17,8 @@ import numpy as np
 from hdsim.diagnosis.coordinates import coordinates
 from hdsim.diagnosis.evidence import Evidence, LawEvidence, PlaceEvidence, StageEvidence
 from hdsim.diagnosis.rules import RULES
+from hdsim.diagnosis.sentences import LEAST_REST
 from hdsim.diagnosis.verdict import Remainder, Verdict
-from hdsim.diagnosis.workflow import LEAST_REST
 from hdsim.estimate.orders import Line, order_lines
 from hdsim.estimate.prove import held_out_gap
 

@@ -1,0 +1,137 @@
+"""What a verdict says: its sentences and the effects, parameters and regressors that it lists."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hdsim.diagnosis.decide import Decision
+from hdsim.diagnosis.evidence import Evidence
+from hdsim.diagnosis.locate import SHARP
+from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.remainder import remainder
+from hdsim.diagnosis.rules import RULES
+from hdsim.diagnosis.search import Stage
+from hdsim.diagnosis.verdict import Located, NamedEffect, Verdict
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, added_spreads
+from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.numbers import Interval
+from hdsim.estimate.write import fitted_numbers
+
+#: Least part of the structure that is said to follow another shape than its law's.
+LEAST_REST = 0.02
+
+
+def without_a_name(stages: Sequence[Stage], evidence: Evidence, common: Mapping[str, Any]) -> Verdict:
+    """``unknown``, with what the residual depends on and the closest effects."""
+    place = max(stages, key=lambda stage: stage.location.structured).location.places[0]
+    nearest = ", ".join(law.name.replace("_", " ") for law in evidence.laws)
+    share = f"{100 * evidence.explained:.0f} % of the systematic residual"
+    said = f"; closest: {nearest}, {share}" if nearest else ""
+    return Verdict(
+        verdict="unknown",
+        sentence="An effect is missing, and none of the catalogue explains enough to be identified: "
+        f"{100 * place.share:.0f} % of the residual of {place.channel} is a function of "
+        f"{place.coordinate.replace('_', ' ')}{said}.",
+        suspects={law.name: round(law.gain, 3) for law in evidence.laws},
+        **common,
+    )
+
+
+def without_a_place(bench: Bench, last: Fit, common: Mapping[str, Any]) -> Verdict:
+    """``unknown``, where the residual depends on nothing that the data repeat."""
+    rest = remainder(bench, last.predictions)
+    assert rest is not None  # the evidence has said so
+    return Verdict(
+        verdict="unknown",
+        sentence="An effect is missing that no effect of the catalogue explains: the residual of "
+        f"{rest.channel} in {rest.record} reaches {rest.times_noise:.2g} times its noise, most of it "
+        f"between {rest.start_s:.3g} and {rest.end_s:.3g} s, and is a function of no regressor that "
+        "these data repeat.",
+        remainder=rest,
+        **common,
+    )
+
+
+def rest_words(last: Stage, evidence: Evidence) -> str:
+    """What the names leave, with its place; nothing where it may be chance."""
+    left = 1.0 - evidence.explained
+    if evidence.left_chance > RULES.chance or left < LEAST_REST or not last.location.places:
+        return ""
+    place = last.location.places[0]
+    coordinate = place.coordinate.replace("_", " ")
+    return f" {100 * left:.0f} % of the systematic residual remains, a function of the {coordinate}."
+
+
+def numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:
+    """``parameter``, with those that are wrong."""
+    changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
+    said = f"parameters of the model are wrong: {', '.join(changes)}."
+    if not sure:
+        said = f"a parameter of the model is wrong, most simply {' or '.join(i.name for i in off)}."
+    return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
+
+
+def fitted_number(interval: Interval) -> FittedNumber:
+    """A fitted parameter as the verdict lists it."""
+    bounds = (interval.low, interval.high) if interval.determined else None
+    return FittedNumber(value=interval.value, interval=bounds, start=interval.start, tied_to=interval.tied_to)
+
+
+def named_effects(named: Sequence[Named], decision: Decision, final: Fit) -> list[NamedEffect]:
+    """The effects that a decision names, as the verdict lists them."""
+    known = catalogue()
+    found = []
+    chances = [decision.confidence[k] for k in decision.names]
+    spreads = added_spreads(final)
+    for one, confidence, (added, covariance, shapes) in zip(named, chances, spreads, strict=True):
+        confused = known[one.name].signature.confused_with
+        found.append(
+            NamedEffect(
+                name=one.name,
+                title=" ".join(
+                    [known[one.name].title, f"({added.fitting.label})" if added.fitting.label else ""]
+                ).strip(),
+                confidence=confidence,
+                chance=one.chance,
+                explained=one.share,
+                parameters=fitted_numbers(added, covariance, shapes),
+                settings=added.settings(),
+                indistinguishable_from=list(one.group),
+                separated_by={
+                    other: confused.get(other) or known[other].signature.confused_with.get(one.name, "")
+                    for other in one.group
+                },
+            )
+        )
+    return found
+
+
+def effect_words(effect: NamedEffect) -> str:
+    """An effect's title, with those that the data cannot distinguish from it."""
+    others = [catalogue()[name].title for name in effect.indistinguishable_from]
+    alike = f"{effect.title} (not distinguishable with these data from {', '.join(others)})"
+    return alike if others else effect.title
+
+
+def located(stages: Sequence[Stage], most: int = 6) -> list[Located]:
+    """The strongest regressors of each stage, and every order."""
+    found = []
+    for stage in stages:
+        best: dict[tuple[str, str], Located] = {}
+        for place in stage.location.places:
+            key = (place.coordinate, place.channel)
+            if key in best or place.share < 0.02 or (len(best) >= most and place.coordinate != SHARP):
+                continue
+            orders = [line.order for line in stage.location.lines if line.channel == place.channel]
+            best[key] = Located(
+                stage=stage.title,
+                coordinate=place.coordinate,
+                channel=place.channel,
+                share=round(place.share, 4),
+                orders=orders if place.coordinate == SHARP else [],
+            )
+        found += list(best.values())
+    return found
