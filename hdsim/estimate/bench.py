@@ -46,6 +46,8 @@ class Bench:
         self.training, self.zeros = len(training), zeros
         self.series: list[Series] = []
         self.blocks = 0
+        #: Error of the short cut that was not taken (``hdsim.estimate.short_cut``), by channel.
+        self.refused: dict[str, float] = {}
         for index, predictor in enumerate(self.predictors):
             self._add(index, predictor, own_record=index >= self.training, split=not holdout)
         if not any(series.train.any() for series in self.series):
