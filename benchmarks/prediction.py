@@ -9,11 +9,16 @@ processor seconds, the shortest of several; errors the largest relative root-mea
 against a run at 1e-11. ``ten beside`` is ``samples_beside`` with ten models whose load differs a little, in
 units of that call without them: finite differences to ten numbers need ten. The last columns are wall seconds
 of sixteen models in one thread and in two.
+
+Before that, what teeth cost in a fit or a diagnosis: predictions of the drive ``seed-2021`` by its bench,
+which take the short cut of ``hdsim.estimate.short_cut``, and their error against the whole model over the
+noise.
 """
 
 from __future__ import annotations
 
 import math
+import statistics
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -24,8 +29,12 @@ from rich.console import Console
 from rich.table import Table
 
 from hdsim.drive.model import Model
-from hdsim.estimate.predict import LEAD_IN_S, Candidate, Predictor, plan_for
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.plan import plan_for
+from hdsim.estimate.predict import COARSE_RTOL, LEAD_IN_S, RTOL, Candidate, Predictor
 from hdsim.estimate.records import Record
+from hdsim.estimate.short_cut import short_cut_of, whole_models
+from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 from hdsim.simulation.run import Run
 from hdsim.simulation.sample import alike, samples_beside
@@ -56,15 +65,20 @@ def record_of(seconds: float) -> Record:
     )
 
 
-def candidate_of(mesh: str, effects: dict[str, object]) -> Candidate:
-    """A model with an arm on its output."""
-    scenario = Scenario.model_validate({
-        "drive": {"preset": "csg-20-100", "mesh": {"model": mesh}},
+def scenario_of(mesh: str, effects: dict[str, object], preset: str = "csg-20-100") -> Scenario:
+    """A drive with an arm on its output."""
+    return Scenario.model_validate({
+        "drive": {"preset": preset, "mesh": {"model": mesh}},
         "effects": effects,
         "command": {"motor": {"type": "free"}},
         "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
         "run": {"duration_s": 1.0},
     })  # fmt: skip
+
+
+def candidate_of(mesh: str, effects: dict[str, object]) -> Candidate:
+    """The model of such a drive."""
+    scenario = scenario_of(mesh, effects)
     return Candidate(scenario.drive, scenario.effects.active(), scenario.load)
 
 
@@ -168,10 +182,39 @@ def row(record: Record, name: str) -> list[str]:
     ]
 
 
+def meshes(record: Record, repeats: int = 5) -> Table:
+    """Cost of predictions by mesh, beside the lumped one's, measured in turns."""
+    states, benches = {}, {}
+    for mesh in ("lumped", "tabulated", "teeth"):
+        scenario = scenario_of(mesh, {}, preset="seed-2021")
+        benches[mesh], states[mesh] = bench_for([record], [], scenario), state_of(scenario)
+    costs: dict[tuple[str, float], list[float]] = {}
+    for _ in range(repeats):
+        for rtol in (RTOL, COARSE_RTOL):
+            for mesh, bench in benches.items():
+                bench.predictors[0].rtol = rtol
+                costs.setdefault((mesh, rtol), []).append(cheapest(partial(bench.predict, states[mesh]), 1))
+    table = Table(title="predictions of a bench, processor ms")
+    for title in ("mesh", f"at {RTOL:g}", "ratio", f"at {COARSE_RTOL:g}", "ratio", "error over noise"):
+        table.add_column(title, justify="right")
+    for mesh, bench in benches.items():
+        bench.predictors[0].rtol = RTOL
+        short = bench.predict(states[mesh])
+        with whole_models(bench):
+            found = short_cut_of(bench, short, bench.predict(states[mesh]))
+        row = [mesh]
+        for rtol in (RTOL, COARSE_RTOL):
+            ratios = [a / b for a, b in zip(costs[mesh, rtol], costs["lumped", rtol], strict=True)]
+            row += [f"{1e3 * min(costs[mesh, rtol]):.1f}", f"{statistics.median(ratios):.1f}"]
+        table.add_row(*row, "-" if found is None else f"{max(found.error.values()):.4f}")
+    return table
+
+
 def main() -> None:
     """Measure and print."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
     record = record_of(seconds)
+    Console(width=160).print(meshes(record))
     table = Table(title=f"{seconds:g} s at 1 kHz, processor ms at a tolerance of 1e-6")
     titles = ("run", "predict", "ratio", "error run", "predict", "ratio at equal error", "ten beside")
     table.add_column("model")

@@ -9,7 +9,7 @@ from pydantic import Field
 from hdsim.diagnosis.decide import Reason
 from hdsim.diagnosis.further import CurveFound, NextExperiment
 from hdsim.diagnosis.growth import TrackedOrder
-from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part
+from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part, ShortCut
 
 VERSION = 2
 
@@ -134,8 +134,7 @@ class Verdict(Part):
     readings: int = 1
     """Successive readings whose means were compared, of the record that was read fastest; all numbers, gaps
     and their noise are of these means."""
-    short_cut: dict[str, float] = {}
-    """Of a base with teeth, how far predictions by the short cut are from those of the whole model, at the
-    end: standard deviation over the noise, by channel."""
+    short_cut: ShortCut | None = None
+    """How predictions with teeth were made; null without teeth."""
     seconds: dict[str, float] = {}
     """Processor time spent in each step, s."""

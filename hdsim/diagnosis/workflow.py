@@ -42,7 +42,7 @@ from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit, tie, together
-from hdsim.estimate.short_cut import short_cut_error
+from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.thin import readings_of_means
@@ -225,7 +225,7 @@ def _diagnosed(
         "because": decision.because,
         "curve": curve.found() if curve is not None else None,
         "readings": readings,
-        "short_cut": short_cut_error(bench, current.predictions, predictions["after"]),
+        "short_cut": short_cut_of(bench, current.predictions, predictions["after"]),
         "seconds": seconds,
     }
     patterned = evidence.left_chance <= RULES.chance and evidence.left >= RULES.structured

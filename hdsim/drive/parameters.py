@@ -100,8 +100,8 @@ class Inertia(Parameters):
 STICKS_RAD_PER_S = 2e-6
 #: The same where the speed is a measured one, or where a drive is linearised at rest.
 RESOLVED_RAD_PER_S = 0.5
-#: Damping ratio below which a ring vibrates on from tooth to tooth: at 1 % a prediction costs six times one
-#: with the presets' damping, and with none a hundred times more again.
+#: Damping ratio below which a ring vibrates on from tooth to tooth: at 3 % a prediction costs six times one
+#: with the presets' damping, and with none some two hundred times.
 RINGS_ON = 0.01
 
 

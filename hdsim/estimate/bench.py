@@ -48,6 +48,8 @@ class Bench:
         self.blocks = 0
         #: Predictions with the model's own flanks, then with others (``flanks.hear_flanks``).
         self.redrawn: list[list[Array]] = []
+        #: Error of the short cut that was not taken (``hdsim.estimate.short_cut``), by channel.
+        self.refused: dict[str, float] = {}
         for index, predictor in enumerate(self.predictors):
             self._add(index, predictor, own_record=index >= self.training, split=not holdout)
         if not any(series.train.any() for series in self.series):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ from hdsim.estimate.covariance import correlation
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.determine import UNDETERMINED
 from hdsim.estimate.fit import Fit
-from hdsim.estimate.found import Gap
+from hdsim.estimate.found import Gap, ShortCut
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, undeclared
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
@@ -25,7 +25,7 @@ from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit
-from hdsim.estimate.short_cut import short_cut_error
+from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
@@ -76,7 +76,7 @@ class Estimation:
         fit: the model as fitted.
         refit: how it was fitted.
         predictions: of all series, ``before`` and ``after``.
-        short_cut: see ``hdsim.estimate.short_cut.short_cut_error``, of the fitted model.
+        short_cut: how predictions with teeth were made; None without.
     """
 
     intervals: list[Interval]
@@ -92,7 +92,7 @@ class Estimation:
     fit: Fit
     refit: Refit
     predictions: dict[str, list[Array]]
-    short_cut: dict[str, float] = field(default_factory=dict)
+    short_cut: ShortCut | None = None
 
     @property
     def moved(self) -> list[str]:
@@ -198,7 +198,7 @@ def estimate(
         found.fit,
         found,
         predictions,
-        short_cut_error(bench, found.fit.predictions, predictions["after"]),
+        short_cut_of(bench, found.fit.predictions, predictions["after"]),
     )
 
 

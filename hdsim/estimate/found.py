@@ -52,6 +52,16 @@ class Gap(Part):
     """95 % intervals by the names of the above, from resampled blocks of time."""
 
 
+class ShortCut(Part):
+    """How predictions with teeth were made cheaper, see ``hdsim/estimate/short_cut.py``."""
+
+    taken: bool
+    """Whether the fits took it; not where it erred too far at the base model."""
+    error: dict[str, float]
+    """How far its predictions are from those of the whole model: standard deviation over the noise, by
+    channel; of the final model, or of the base where it was not taken."""
+
+
 class DataProblem(Part):
     """Something wrong with the data."""
 

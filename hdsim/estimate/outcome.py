@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from hdsim.estimate.estimation import Estimation
-from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part
+from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part, ShortCut
 from hdsim.estimate.numbers import Interval
 
 
@@ -70,9 +70,8 @@ class FitResult(Part):
     """Offsets and zeros of each record."""
     data_problems: list[DataProblem] = []
     """What is wrong with the data."""
-    short_cut: dict[str, float] = {}
-    """Of a model with teeth, how far predictions by the short cut are from those of the whole model: standard
-    deviation over the noise, by channel."""
+    short_cut: ShortCut | None = None
+    """How predictions with teeth were made; null without teeth."""
     scenario: str = ""
     """The fitted scenario's file."""
 

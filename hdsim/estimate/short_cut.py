@@ -23,6 +23,7 @@ import numpy as np
 
 from hdsim.drive.parameters import TabulatedMesh, TeethMesh
 from hdsim.errors import InputError, PhysicsError
+from hdsim.estimate.found import ShortCut
 from hdsim.estimate.predict import Candidate, PredictionError
 
 if TYPE_CHECKING:
@@ -50,29 +51,36 @@ def take_short_cut(bench: Bench, state: State) -> None:
         short = bench.predict(state)
         with whole_models(bench):
             whole = bench.predict(state)
-        if max(short_cut_error(bench, short, whole).values(), default=0.0) > LIMIT:
-            for predictor in bench.predictors:
-                predictor.whole = True
     except PredictionError:
         return  # whoever predicts it next says so
+    error = _error(bench, short, whole)
+    if max(error.values(), default=0.0) > LIMIT:
+        bench.refused = error
+        for predictor in bench.predictors:
+            predictor.whole = True
 
 
-def short_cut_error(bench: Bench, short: Sequence[Array], whole: Sequence[Array]) -> dict[str, float]:
-    """What the short cut does to the predictions of the training records; empty where none is taken.
+def short_cut_of(bench: Bench, short: Sequence[Array], whole: Sequence[Array]) -> ShortCut | None:
+    """What the short cut did to the predictions of the training records; None of a base without teeth.
 
     Args:
         bench: the measured series.
         short: their predictions by a model.
         whole: by the same model without the short cut.
-
-    Returns:
-        By channel the largest standard deviation of a record, as a part of the noise.
     """
+    if bench.predictors[0].table_for is None:
+        return None
+    if bench.refused:
+        return ShortCut(taken=False, error=bench.refused)
+    return ShortCut(taken=True, error=_error(bench, short, whole))
+
+
+def _error(bench: Bench, short: Sequence[Array], whole: Sequence[Array]) -> dict[str, float]:
+    """By channel the largest standard deviation of a record, as a part of the noise."""
     found: dict[str, float] = {}
     for series, here, there in zip(bench.series, short, whole, strict=True):
-        predictor, rows = bench.predictors[series.record], series.train
-        if predictor.table_for is not None and not predictor.whole and len(here) and rows.any():
-            part = float(np.std(here[rows] - there[rows])) / series.noise
+        if len(here) and series.train.any():
+            part = float(np.std((here - there)[series.train])) / series.noise
             found[series.channel] = max(part, found.get(series.channel, 0.0))
     return found
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hdsim.diagnosis.verdict import NamedEffect
-from hdsim.estimate.found import Gap
+from hdsim.estimate.found import Gap, ShortCut
 from hdsim.plot import units
 from hdsim.scenario.fields import split_unit
 
@@ -86,9 +86,14 @@ def percent(share: float) -> str:
     return "over 99\u00a0%" if share > 0.995 else f"{100 * share:.0f}\u00a0%"
 
 
-def short_cut_words(parts: Mapping[str, float]) -> str:
+def short_cut_words(short_cut: ShortCut) -> str:
     """How predictions with teeth were made, and how far from the whole model that is."""
-    far = ", ".join(f"{spoken(c)} {100 * part:.2g}\u00a0%" for c, part in parts.items())
+    far = ", ".join(f"{spoken(c)} {100 * part:.2g}\u00a0%" for c, part in short_cut.error.items())
+    if not short_cut.taken:
+        return (
+            "All predictions are those of the whole model, every tooth and the ring. A table of the teeth "
+            f"without the ring's own vibration would have been off by too much of the noise: {far}."
+        )
     return (
         "Fits predicted the teeth from a table and left out their ring's own vibration. What that does to "
         f"the final model's predictions, as a part of the noise: {far}. The proof rests on the whole model."

@@ -9,11 +9,12 @@ from hdsim.drive.parameters import TabulatedMesh, TeethMesh
 from hdsim.estimate import short_cut
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
-from hdsim.estimate.short_cut import LIMIT, short_cut_error, whole_models
+from hdsim.estimate.short_cut import LIMIT, short_cut_of, whole_models
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 from hdsim.simulation.rosenbrock import rodas4_through
 from hdsim.simulation.spans import stops
+from hdsim.tell.words import short_cut_words
 
 NOISE = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3, "output_torque": 0.15}
 RATIO = -100.0
@@ -72,7 +73,9 @@ def model_of(base, **given):
 )
 def test_the_short_cut_stays_a_small_part_of_the_noise(motion, effects, section):
     bench, state = opened(scenario("teeth", motion, effects=effects, **section), motion)
-    error = short_cut_error(bench, *both(bench, state))
+    found = short_cut_of(bench, *both(bench, state))
+    assert found.taken
+    error = found.error
     assert set(error) == {"motor_torque", "output_angle", "output_torque"}
     assert max(error.values()) < 0.03
     # Not the same predictions after all: the whole model follows its ring.
@@ -82,12 +85,12 @@ def test_the_short_cut_stays_a_small_part_of_the_noise(motion, effects, section)
 def test_the_whole_model_is_as_good_as_one_that_follows_the_ring_to_the_end():
     bench, state = opened(scenario("teeth"))
     short, whole = both(bench, state)
-    away = short_cut_error(bench, short, whole)
+    away = short_cut_of(bench, short, whole).error
     # A hundredth of the tolerance resolves the ring's own vibration.
     bench.predictors[0].rtol = 1e-8
     with whole_models(bench):
         exact = bench.predict(state)
-    for channel, left in short_cut_error(bench, whole, exact).items():
+    for channel, left in short_cut_of(bench, whole, exact).error.items():
         assert left < 0.5 * away[channel], channel
 
 
@@ -150,12 +153,15 @@ def test_a_short_cut_that_errs_too_far_is_not_taken(monkeypatch):
     assert bench.predictors[0].whole
     short, whole = both(bench, state)
     np.testing.assert_array_equal(short[0], whole[0])
-    assert short_cut_error(bench, short, whole) == {}
+    found = short_cut_of(bench, short, whole)
+    assert not found.taken
+    assert 0.0 < max(found.error.values()) < 0.03  # what it would have been
+    assert "All predictions are those of the whole model" in short_cut_words(found)
 
 
 def test_a_base_without_teeth_has_no_short_cut():
     bench, state = opened(scenario("lumped"))
-    assert short_cut_error(bench, *both(bench, state)) == {}
+    assert short_cut_of(bench, *both(bench, state)) is None
 
 
 def test_a_ring_that_nothing_damps_stands_in_balance():

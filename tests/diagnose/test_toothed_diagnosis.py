@@ -1,0 +1,58 @@
+"""A diagnosis whose base has all its teeth: what is hidden from it is named, in the time of a coffee."""
+
+import time
+
+import numpy as np
+import pytest
+
+import hdsim
+from hdsim.diagnosis.workflow import diagnose
+from hdsim.estimate.records import Record
+from hdsim.scenario import Scenario
+
+NOISE = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3}
+SECONDS = 3.0
+
+
+def drive(mesh, **effects):
+    sine = {"type": "sine", "amplitude_deg": 30.0, "frequency_hz": 0.5}
+    gains = {"position_gain_per_s": 30, "velocity_gain_nm_s_per_rad": 0.025}
+    controller = {"type": "cascade", **gains, "velocity_integral_gain_nm_per_rad": 0.5}
+    return Scenario.model_validate({
+        "drive": {"preset": "seed-2021", "mesh": {"model": mesh}},
+        "effects": effects,
+        "command": {
+            "motor": {"type": "position", "at": "output", "trajectory": sine, "controller": controller}
+        },
+        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
+        "run": {"duration_s": SECONDS, "sample_rate_hz": 1000.0, "rtol": 1e-5},
+    })  # fmt: skip
+
+
+def seen(plant):
+    run, rng = hdsim.simulate(plant), np.random.default_rng(0)
+    channels = {c: run[c] + size * rng.standard_normal(len(run.time)) for c, size in NOISE.items()}
+    return Record("swing", run.time, channels)
+
+
+@pytest.mark.slow
+def test_hidden_friction_is_named_against_all_teeth():
+    record = seen(drive("teeth", stribeck_friction={"extra_static_nm": 0.08}))
+    began = time.process_time()
+    verdict = diagnose([record], drive("teeth")).verdict
+    spent = time.process_time() - began
+    assert verdict.effects[0].name == "stribeck_friction"
+    gap = verdict.gap["motor_torque"]
+    assert gap.after < min(gap.before, 1.3 * gap.noise)
+    assert verdict.short_cut.taken
+    assert max(verdict.short_cut.error.values()) < 0.03
+    assert spent < 60.0
+
+
+@pytest.mark.slow
+def test_nothing_is_named_where_teeth_are_all_there_is():
+    verdict = diagnose([seen(drive("teeth"))], drive("tabulated")).verdict
+    assert verdict.verdict == "nothing"
+    gap = verdict.gap["output_angle"]
+    # The base's own teeth are the plant's: nothing but noise is left from the start.
+    assert gap.before < 1.1 * gap.noise
