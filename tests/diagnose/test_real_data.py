@@ -100,10 +100,6 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
 
 @pytest.mark.slow
 @pytest.mark.skipif(not CYCLOIDAL.exists(), reason="the recordings are not here")
-@pytest.mark.xfail(
-    run=False,
-    reason="two minutes; the play's probability is 0.50 to 0.74 by where the model without it comes to rest",
-)
 def test_a_cycloidal_actuator_has_play_of_the_loops_own_width_and_hysteresis():
     mapping = ROOT / "scenarios" / "mappings" / "cycloidal_torque_ramp.yaml"
     record = record_from(hdsim.import_recording(CYCLOIDAL, mapping), "ramps")
