@@ -106,6 +106,22 @@ class Signature:
     exact: bool = False
 
 
+@dataclass(frozen=True)
+class OfTeeth:
+    """What a field of an effect says of the teeth, for reports.
+
+    Args:
+        field: its name.
+        says: ``place``: a tooth's number on the spline that the field ``member`` names; ``play``: how much
+            wider all gaps are; ``growth``: by which part of itself each gap is wider.
+        play_arcmin: of ``play``, the play at the output for 1 of the field, arcmin.
+    """
+
+    field: str
+    says: Literal["place", "play", "growth"]
+    play_arcmin: float = 0.0
+
+
 class Parameters(BaseModel):
     """Base of everything that a scenario can set: unknown keys refused, values checked, frozen."""
 
@@ -238,6 +254,7 @@ class Effect(Part):
         several: whether its fittings are errors of different things, one beside the other.
         adds_to: its fields that come on top of a number of the drive, by that number's path in the drive.
         printed: whether catalogues print how large it is, so that ``effects: {set: catalogue}`` turns it on.
+        of_teeth: what it says of the teeth, if anything.
     """
 
     title: ClassVar[str]
@@ -247,6 +264,7 @@ class Effect(Part):
     several: ClassVar[bool] = False
     adds_to: ClassVar[tuple[tuple[str, str], ...]] = ()
     printed: ClassVar[bool] = False
+    of_teeth: ClassVar[OfTeeth | None] = None
 
     @classmethod
     def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:

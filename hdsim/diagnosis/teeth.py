@@ -11,17 +11,16 @@ import numpy as np
 from hdsim.diagnosis.verdict import NamedEffect, TeethFound
 from hdsim.drive.parameters import LumpedMesh, ToothedMesh
 from hdsim.drive.play_as_teeth import PlayAsTeeth, half_gap_of_play, play_as_teeth
+from hdsim.effects import catalogue
 from hdsim.errors import PhysicsError
 from hdsim.estimate.found import FittedNumber
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
+    from hdsim.parts import OfTeeth
 
 #: Radians in an arc minute.
 _ARCMIN = math.pi / 10800.0
-#: Effects that change the mesh's half-gap, by the field that says by how much as an angle at the output, and
-#: the part of it that each tooth has.
-_GAPS = {"output_backlash": ("backlash_arcmin", 0.5), "mesh_preload": ("interference_arcmin", -1.0)}
 
 
 def teeth_found(effects: Sequence[NamedEffect], state: State) -> TeethFound | None:
@@ -33,18 +32,21 @@ def teeth_found(effects: Sequence[NamedEffect], state: State) -> TeethFound | No
     """
     found = TeethFound()
     for effect in effects:
-        if effect.name == "tooth_error" and "tooth" in effect.parameters:
-            _place(found, effect, state)
-        elif effect.name in (*_GAPS, "flank_wear") and isinstance(state.drive.mesh, ToothedMesh):
-            _gap(found, effect, state)
-        elif effect.name == "output_backlash" and isinstance(state.drive.mesh, LumpedMesh):
-            _play(found, effect, state)
+        of = catalogue()[effect.name].of_teeth
+        if of is None or of.field not in effect.parameters:
+            continue
+        if of.says == "place":
+            _place(found, effect, of, state)
+        elif isinstance(state.drive.mesh, ToothedMesh):
+            _gap(found, effect, of, state)
+        elif isinstance(state.drive.mesh, LumpedMesh) and of.play_arcmin > 0.0:
+            _play(found, effect, of, state)
     return found if found.sentences else None
 
 
-def _place(found: TeethFound, effect: NamedEffect, state: State) -> None:
+def _place(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> None:
     """The number of a tooth on its spline, from 0; its opposite one acts at the same time."""
-    number, member = effect.parameters["tooth"], str(effect.settings.get("member", "flexspline"))
+    number, member = effect.parameters[of.field], str(effect.settings.get("member", "flexspline"))
     geometry = state.drive.geometry
     count = geometry.circular_spline_teeth if member == "circular_spline" else geometry.flexspline_teeth
     turns = math.floor(number.value / (0.5 * count)) * 0.5 * count
@@ -61,36 +63,34 @@ def _place(found: TeethFound, effect: NamedEffect, state: State) -> None:
     )
 
 
-def _gap(found: TeethFound, effect: NamedEffect, state: State) -> None:
+def _gap(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> None:
     """The mean half-gap of a mesh with teeth."""
     mesh, drive = state.drive.mesh, state.drive
-    field, part = _GAPS.get(effect.name, ("growth", 0.0))
     start = mesh.gap_factor * (
         mesh.half_gap_m
         if mesh.half_gap_m is not None
         else float(np.mean(mesh.flanks.half_gaps(drive.geometry.flexspline_teeth, state.seed)))
     )
-    change = effect.parameters[field]
+    change = effect.parameters[of.field]
     ends = [change.value, *(change.interval or ())]
-    if effect.name == "flank_wear":
+    if of.says == "growth":
         gaps = [1e6 * start * (1.0 + end) for end in ends]
     else:
-        gaps = [1e6 * (start + 2.0 * part * half_gap_of_play(drive, end * _ARCMIN)) for end in ends]
+        gaps = [1e6 * (start + of.play_arcmin * half_gap_of_play(drive, end * _ARCMIN)) for end in ends]
     found.half_gap_um = FittedNumber(
         value=gaps[0], interval=(min(gaps[1:]), max(gaps[1:])) if gaps[1:] else None, start=1e6 * start
     )
     found.sentences.append(
-        f"The teeth's mean half-gap is {gaps[0]:.3g} µm{_ends(found.half_gap_um)} instead of "
-        f"{1e6 * start:.3g}."
+        f"With the model's engagement and flanks the teeth's mean half-gap is {gaps[0]:.3g} µm"
+        f"{_ends(found.half_gap_um)} instead of {1e6 * start:.3g}."
     )
 
 
-def _play(found: TeethFound, effect: NamedEffect, state: State) -> None:
+def _play(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> None:
     """What a play means in teeth, and the drive with teeth that has it."""
-    play = effect.parameters["backlash_arcmin"]
-    gaps = [
-        1e6 * half_gap_of_play(state.drive, end * _ARCMIN) for end in (play.value, *(play.interval or ()))
-    ]
+    play = effect.parameters[of.field]
+    ends = [of.play_arcmin * end * _ARCMIN for end in (play.value, *(play.interval or ()))]
+    gaps = [1e6 * half_gap_of_play(state.drive, end) for end in ends]
     found.half_gap_um = FittedNumber(value=gaps[0], interval=(gaps[1], gaps[2]) if gaps[1:] else None)
     radius = 1e3 * state.drive.geometry.pitch_radius_m
     said = (
@@ -98,7 +98,7 @@ def _play(found: TeethFound, effect: NamedEffect, state: State) -> None:
         f"pitch radius of {radius:.4g} mm"
     )
     try:
-        teeth = play_as_teeth(state.drive, play.value * _ARCMIN, seed=state.seed)
+        teeth = play_as_teeth(state.drive, ends[0], seed=state.seed)
     except PhysicsError as error:
         found.sentences.append(f"{said}. No drive with teeth is written: {error}.")
         return
@@ -131,13 +131,16 @@ def toothed_changes(effects: Sequence[NamedEffect], state: State) -> dict[str, A
         effects: as named.
         state: the model with them.
     """
-    play = next((effect for effect in effects if effect.name == "output_backlash"), None)
-    if play is None or not isinstance(state.drive.mesh, LumpedMesh):
+    if not isinstance(state.drive.mesh, LumpedMesh):
         return None
-    try:
-        teeth = play_as_teeth(
-            state.drive, play.parameters["backlash_arcmin"].value * _ARCMIN, seed=state.seed
-        )
-    except PhysicsError:
-        return None
-    return {"drive": teeth.changes, "effects": {"output_backlash": None}}
+    for effect in effects:
+        of = catalogue()[effect.name].of_teeth
+        if of is None or of.play_arcmin <= 0.0 or of.field not in effect.parameters:
+            continue
+        play = of.play_arcmin * effect.parameters[of.field].value * _ARCMIN
+        try:
+            teeth = play_as_teeth(state.drive, play, seed=state.seed)
+        except PhysicsError:
+            return None
+        return {"drive": teeth.changes, "effects": {effect.name: None}}
+    return None

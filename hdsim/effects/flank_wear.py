@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Plausible
-from hdsim.parts import Builder, Effect, Signature
+from hdsim.parts import Builder, Effect, OfTeeth, Signature
 
 
 class FlankWear(Effect):
@@ -35,6 +35,7 @@ class FlankWear(Effect):
             "stiffness_nonlinearity": "soft, but with a finite slope at zero torque",
         },
     )
+    of_teeth: ClassVar[OfTeeth | None] = OfTeeth("growth", "growth")
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting((Amplitude({"growth": 0.5}, signed=True),), mesh="toothed"),
     )

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Plausible
 from hdsim.effects._kernels import ARCMIN
-from hdsim.parts import Builder, Effect, Signature
+from hdsim.parts import Builder, Effect, OfTeeth, Signature
 
 
 class MeshPreload(Effect):
@@ -37,6 +37,7 @@ class MeshPreload(Effect):
             "stiffness_nonlinearity": "stiffer at large torques, a preloaded mesh around none",
         },
     )
+    of_teeth: ClassVar[OfTeeth | None] = OfTeeth("interference_arcmin", "play", -2.0)
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting((Amplitude({"interference_arcmin": 0.1}),), mesh="toothed"),
     )

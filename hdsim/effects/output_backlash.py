@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hdsim.effects._fitting import WIDER, Amplitude, Fitting, Plausible, Shape
 from hdsim.effects._kernels import ARCMIN
-from hdsim.parts import Builder, Effect, Signature
+from hdsim.parts import Builder, Effect, OfTeeth, Signature
 
 if TYPE_CHECKING:
     from hdsim.parts import Array
@@ -42,6 +42,7 @@ class OutputBacklash(Effect):
             "segment",
         },
     )
+    of_teeth: ClassVar[OfTeeth | None] = OfTeeth("backlash_arcmin", "play", 1.0)
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting((Amplitude({"backlash_arcmin": 0.3}),)),
         *(

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.number import FIXED
-from hdsim.parts import Builder, Effect, OddTooth, Signature
+from hdsim.parts import Builder, Effect, OddTooth, OfTeeth, Signature
 
 #: Where a fit looks for the tooth: every 15 degrees of the half turn of the wave generator in which each
 #: tooth passes a lobe once; an arc of teeth under load is about 50 degrees wide.
@@ -48,6 +48,7 @@ class ToothError(Effect):
             "torque",
         },
     )
+    of_teeth: ClassVar[OfTeeth | None] = OfTeeth("tooth", "place")
     fittings: ClassVar[tuple[Fitting, ...]] = tuple(
         Fitting(
             (Amplitude({"shift_um": 10.0}, signed=True),),
