@@ -12,11 +12,11 @@ from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.remainder import remainder
 from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.search import Stage
-from hdsim.diagnosis.verdict import Located, NamedEffect, Verdict
+from hdsim.diagnosis.verdict import IdentifiedEffect, Located, Verdict
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, added_spreads
-from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.found import ParameterEstimate
 from hdsim.estimate.numbers import Interval
 from hdsim.estimate.write import fitted_numbers
 
@@ -74,13 +74,15 @@ def numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: boo
     return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
 
 
-def fitted_number(interval: Interval) -> FittedNumber:
+def fitted_number(interval: Interval) -> ParameterEstimate:
     """A fitted parameter as the verdict lists it."""
     bounds = (interval.low, interval.high) if interval.determined else None
-    return FittedNumber(value=interval.value, interval=bounds, start=interval.start, tied_to=interval.tied_to)
+    return ParameterEstimate(
+        value=interval.value, interval=bounds, start=interval.start, tied_to=interval.tied_to
+    )
 
 
-def named_effects(named: Sequence[Named], decision: Decision, final: Fit) -> list[NamedEffect]:
+def named_effects(named: Sequence[Named], decision: Decision, final: Fit) -> list[IdentifiedEffect]:
     """The effects that a decision names, as the verdict lists them."""
     known = catalogue()
     found = []
@@ -89,7 +91,7 @@ def named_effects(named: Sequence[Named], decision: Decision, final: Fit) -> lis
     for one, confidence, (added, covariance, shapes) in zip(named, chances, spreads, strict=True):
         confused = known[one.name].signature.confused_with
         found.append(
-            NamedEffect(
+            IdentifiedEffect(
                 name=one.name,
                 title=" ".join(
                     [known[one.name].title, f"({added.fitting.label})" if added.fitting.label else ""]
@@ -109,7 +111,7 @@ def named_effects(named: Sequence[Named], decision: Decision, final: Fit) -> lis
     return found
 
 
-def effect_words(effect: NamedEffect) -> str:
+def effect_words(effect: IdentifiedEffect) -> str:
     """An effect's title, with those that the data cannot distinguish from it."""
     others = [catalogue()[name].title for name in effect.indistinguishable_from]
     alike = f"{effect.title} (not distinguishable with these data from {', '.join(others)})"

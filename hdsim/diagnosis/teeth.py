@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdsim.diagnosis.verdict import NamedEffect, TeethFound
+from hdsim.diagnosis.verdict import IdentifiedEffect, TeethFound
 from hdsim.drive.parameters import LumpedMesh, ToothedMesh
 from hdsim.drive.play_as_teeth import PlayAsTeeth, half_gap_of_play, play_as_teeth
 from hdsim.effects import catalogue
 from hdsim.errors import PhysicsError
-from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.found import ParameterEstimate
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _ARCMIN = math.pi / 10800.0
 
 
-def teeth_found(effects: Sequence[NamedEffect], state: State) -> TeethFound | None:
+def teeth_found(effects: Sequence[IdentifiedEffect], state: State) -> TeethFound | None:
     """What the named effects say of the teeth; None where they say nothing.
 
     Args:
@@ -44,7 +44,7 @@ def teeth_found(effects: Sequence[NamedEffect], state: State) -> TeethFound | No
     return found if found.sentences else None
 
 
-def _place(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> None:
+def _place(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State) -> None:
     """The number of a tooth on its spline, from 0; its opposite one acts at the same time."""
     number, member = effect.parameters[of.field], str(effect.settings.get("member", "flexspline"))
     geometry = state.drive.geometry
@@ -53,7 +53,7 @@ def _place(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) ->
     value = number.value - turns
     low, high = number.interval or (math.nan, math.nan)
     interval = None if math.isnan(low) else (low - turns, high - turns)
-    found.member, found.tooth = member, FittedNumber(value=value, interval=interval)
+    found.member, found.tooth = member, ParameterEstimate(value=value, interval=interval)
     found.opposite = (value + 0.5 * count) % count
     ends = "" if interval is None else f" ({interval[0]:.0f} to {interval[1]:.0f})"
     found.sentences.append(
@@ -63,7 +63,7 @@ def _place(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) ->
     )
 
 
-def _gap(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> None:
+def _gap(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State) -> None:
     """The mean half-gap of a mesh with teeth."""
     mesh, drive = state.drive.mesh, state.drive
     start = mesh.gap_factor * (
@@ -77,7 +77,7 @@ def _gap(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> N
         gaps = [1e6 * start * (1.0 + end) for end in ends]
     else:
         gaps = [1e6 * (start + of.play_arcmin * half_gap_of_play(drive, end * _ARCMIN)) for end in ends]
-    found.half_gap_um = FittedNumber(
+    found.half_gap_um = ParameterEstimate(
         value=gaps[0], interval=(min(gaps[1:]), max(gaps[1:])) if gaps[1:] else None, start=1e6 * start
     )
     found.sentences.append(
@@ -86,12 +86,12 @@ def _gap(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> N
     )
 
 
-def _play(found: TeethFound, effect: NamedEffect, of: OfTeeth, state: State) -> None:
+def _play(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State) -> None:
     """What a play means in teeth, and the drive with teeth that has it."""
     play = effect.parameters[of.field]
     ends = [of.play_arcmin * end * _ARCMIN for end in (play.value, *(play.interval or ()))]
     gaps = [1e6 * half_gap_of_play(state.drive, end) for end in ends]
-    found.half_gap_um = FittedNumber(value=gaps[0], interval=(gaps[1], gaps[2]) if gaps[1:] else None)
+    found.half_gap_um = ParameterEstimate(value=gaps[0], interval=(gaps[1], gaps[2]) if gaps[1:] else None)
     radius = 1e3 * state.drive.geometry.pitch_radius_m
     said = (
         f"Between teeth this play is a mean half-gap of {gaps[0]:.3g} µm{_ends(found.half_gap_um)} at a "
@@ -120,11 +120,11 @@ def _rough(teeth: PlayAsTeeth) -> str:
     return said
 
 
-def _ends(number: FittedNumber) -> str:
+def _ends(number: ParameterEstimate) -> str:
     return f" ({number.interval[0]:.3g} to {number.interval[1]:.3g})" if number.interval else ""
 
 
-def toothed_changes(effects: Sequence[NamedEffect], state: State) -> dict[str, Any] | None:
+def toothed_changes(effects: Sequence[IdentifiedEffect], state: State) -> dict[str, Any] | None:
     """What turns the scenario that was found into one whose teeth have the play; None where there is none.
 
     Args:

@@ -9,12 +9,12 @@ from pydantic import Field
 from hdsim.diagnosis.decide import Reason
 from hdsim.diagnosis.further import CurveFound, NextExperiment
 from hdsim.diagnosis.growth import TrackedOrder
-from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part, ShortCut
+from hdsim.estimate.found import DataProblem, Gap, ParameterEstimate, Part, ShortCut
 
 VERSION = 2
 
 
-class NamedEffect(Part):
+class IdentifiedEffect(Part):
     """An effect that the model was missing."""
 
     name: str
@@ -28,7 +28,7 @@ class NamedEffect(Part):
     """p-value: probability that the whole search finds such a share where nothing is missing."""
     explained: float
     """Cross-validated share of the residual that it explained when it was found."""
-    parameters: dict[str, FittedNumber] = {}
+    parameters: dict[str, ParameterEstimate] = {}
     """Estimates of its parameters."""
     settings: dict[str, Any] = {}
     """Its fields as the scenario has them, also those that were not fitted, such as orders."""
@@ -75,11 +75,11 @@ class TeethFound(Part):
     """All of it in words."""
     member: str = ""
     """Spline that a single tooth belongs to."""
-    tooth: FittedNumber | None = None
+    tooth: ParameterEstimate | None = None
     """Its number, from the tooth on the wave generator's lobe at zero angles."""
     opposite: float | None = None
     """The tooth half a turn on, which these data cannot tell from it."""
-    half_gap_um: FittedNumber | None = None
+    half_gap_um: ParameterEstimate | None = None
     """Mean half-gap of the teeth."""
     roughness_m: dict[str, float] = {}
     """Fractal roughness G that leaves it, by spline, where the model has no teeth."""
@@ -98,11 +98,11 @@ class Verdict(Part):
     """The verdict as a sentence."""
     confidence: float = Field(1.0, ge=0, le=1)
     """Probability that it is right: of the first effect, or of there being none; calibrated."""
-    effects: list[NamedEffect] = []
+    effects: list[IdentifiedEffect] = []
     """Identified effects in the order in which they were found."""
     suspects: dict[str, float] = {}
     """For ``unknown``: effects that explain a part, with the share, none probable enough to be identified."""
-    parameters: dict[str, FittedNumber] = {}
+    parameters: dict[str, ParameterEstimate] = {}
     """Estimates of the base model's parameters."""
     moved: list[str] = []
     """Those whose interval excludes the base model's value; where there is none although the re-fit reduces a

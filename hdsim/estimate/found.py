@@ -13,7 +13,7 @@ class Part(BaseModel):
     model_config = ConfigDict(use_attribute_docstrings=True, extra="forbid")
 
 
-class FittedNumber(Part):
+class ParameterEstimate(Part):
     """A parameter estimate."""
 
     value: float

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from hdsim.estimate.estimation import Estimation
-from hdsim.estimate.found import DataProblem, FittedNumber, Gap, Part, ShortCut
+from hdsim.estimate.found import DataProblem, Gap, ParameterEstimate, Part, ShortCut
 from hdsim.estimate.numbers import Interval
 
 
-class FitNumber(FittedNumber):
+class FitParameter(ParameterEstimate):
     """An estimated parameter of a model."""
 
     unit: str
@@ -56,7 +56,7 @@ class RecordReading(Part):
 class FitResult(Part):
     """What a fit found."""
 
-    numbers: dict[str, FitNumber]
+    numbers: dict[str, FitParameter]
     """Every free parameter, by its path."""
     moved: list[str]
     """Parameters whose interval excludes the model's value."""
@@ -94,9 +94,9 @@ def result_of(found: Estimation) -> FitResult:
     )
 
 
-def _number(interval: Interval, paths: list[str], left: float | None) -> FitNumber:
+def _number(interval: Interval, paths: list[str], left: float | None) -> FitParameter:
     known = interval.determined and math.isfinite(interval.low)
-    return FitNumber(
+    return FitParameter(
         value=interval.value,
         interval=(interval.low, interval.high) if known else None,
         start=interval.start,

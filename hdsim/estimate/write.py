@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.found import ParameterEstimate
 from hdsim.estimate.numbers import Free
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State, number_at
@@ -92,7 +92,7 @@ def _lists(state: State, name: str) -> dict[str, Any]:
     }
 
 
-def fitted_numbers(added: Added, covariance: Array, deviations: Array) -> dict[str, FittedNumber]:
+def fitted_numbers(added: Added, covariance: Array, deviations: Array) -> dict[str, ParameterEstimate]:
     """An effect's fitted fields with 95 % intervals.
 
     Args:
@@ -102,7 +102,9 @@ def fitted_numbers(added: Added, covariance: Array, deviations: Array) -> dict[s
     """
     found = added.fitting.report(added.coefficients, covariance, added.shapes, deviations, added.orders)
     return {
-        path: FittedNumber(value=one.value, interval=None if math.isnan(one.low) else (one.low, one.high))
+        path: ParameterEstimate(
+            value=one.value, interval=None if math.isnan(one.low) else (one.low, one.high)
+        )
         for path, one in found.items()
     }
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hdsim.diagnosis.verdict import Verdict
-from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.found import ParameterEstimate
 from hdsim.tell.words import named_number, short, shown, spoken, unit_of
 
 GAP_HEAD = ("channel", "unit", "before", "re-fit", "after", "noise", "after/before", "after/noise")
@@ -58,7 +58,9 @@ def section(title: str, body: str, kind: str = "") -> str:
 
 
 def numbers_table(
-    numbers: Mapping[str, FittedNumber], moved: Sequence[str] = (), settings: Mapping[str, Any] | None = None
+    numbers: Mapping[str, ParameterEstimate],
+    moved: Sequence[str] = (),
+    settings: Mapping[str, Any] | None = None,
 ) -> str:
     """Parameter estimates with their intervals and changes; those in ``moved`` are marked.
 
@@ -101,7 +103,7 @@ def numbers_table(
     return f"<div class='wide'><table><tr>{titles}</tr>{''.join(lines)}</table></div>"
 
 
-def _interval(number: FittedNumber, unit: str) -> str:
+def _interval(number: ParameterEstimate, unit: str) -> str:
     if number.interval is None:
         if number.start is None:
             return "fixed, or read from the spectrum"

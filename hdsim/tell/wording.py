@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.screen import LEVEL
-from hdsim.diagnosis.verdict import NamedEffect, Verdict
-from hdsim.estimate.found import FittedNumber
+from hdsim.diagnosis.verdict import IdentifiedEffect, Verdict
+from hdsim.estimate.found import ParameterEstimate
 from hdsim.tell.because import weighings
 from hdsim.tell.findings import Findings
 from hdsim.tell.words import (
@@ -188,7 +188,7 @@ def _unsure(verdict: Verdict) -> bool:
     )
 
 
-def _change(name: str, number: FittedNumber) -> str:
+def _change(name: str, number: ParameterEstimate) -> str:
     words, unit = named_number(name)
     start = "" if number.start is None else f" instead of {shown(number.start)}"
     return f"{words} {shown(number.value)}{start} {unit}".rstrip()
@@ -275,7 +275,7 @@ def _of_effects(found: Findings) -> Sureness:
     return _capped(Sureness(words, number, tuple(said)), found)
 
 
-def _title(effect: NamedEffect) -> str:
+def _title(effect: IdentifiedEffect) -> str:
     return effect.title or spoken(effect.name)
 
 
@@ -315,7 +315,7 @@ def farthest(verdict: Verdict) -> float:
     return max(found, default=0.0)
 
 
-def _distance(number: FittedNumber) -> float:
+def _distance(number: ParameterEstimate) -> float:
     if number.interval is None or number.start is None:
         return 0.0
     low, high = number.interval

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hdsim.diagnosis.verdict import NamedEffect
+from hdsim.diagnosis.verdict import IdentifiedEffect
 from hdsim.estimate.found import Gap, ShortCut
 from hdsim.plot import units
 from hdsim.scenario.fields import split_unit
@@ -173,6 +173,6 @@ def title_of(name: str) -> str:
     return known[name].title if name in known else spoken(name)
 
 
-def titles_of(effect: NamedEffect) -> list[str]:
+def titles_of(effect: IdentifiedEffect) -> list[str]:
     """The effect's title, and the titles of those that the data cannot distinguish from it."""
     return [effect.title or spoken(effect.name), *map(title_of, effect.indistinguishable_from)]

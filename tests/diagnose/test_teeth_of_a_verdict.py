@@ -5,13 +5,13 @@ import pytest
 
 import hdsim
 from hdsim.diagnosis.teeth import teeth_found, toothed_changes
-from hdsim.diagnosis.verdict import NamedEffect
+from hdsim.diagnosis.verdict import IdentifiedEffect
 from hdsim.drive.model import Model
 from hdsim.drive.parameters import Drive
 from hdsim.drive.play_as_teeth import play_as_teeth
 from hdsim.drive.spring import catalogue_wind_up
 from hdsim.errors import PhysicsError
-from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.found import ParameterEstimate
 from hdsim.estimate.state import state_of
 from hdsim.scenario.writer import to_yaml
 from hdsim.studies.bench import torsion
@@ -22,13 +22,13 @@ ARCMIN = np.pi / 10800
 
 
 def named(name, settings=None, **parameters):
-    return NamedEffect(
+    return IdentifiedEffect(
         name=name,
         confidence=0.9,
         chance=0.01,
         explained=0.9,
         settings=settings or {},
-        parameters={k: FittedNumber(value=v[0], interval=v[1:] or None) for k, v in parameters.items()},
+        parameters={k: ParameterEstimate(value=v[0], interval=v[1:] or None) for k, v in parameters.items()},
     )
 
 

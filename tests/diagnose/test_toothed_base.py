@@ -12,7 +12,7 @@ from hdsim.diagnosis.search import left_of
 from hdsim.diagnosis.starts import neighbours, starts
 from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.traces import screen, traces
-from hdsim.diagnosis.verdict import NamedEffect
+from hdsim.diagnosis.verdict import IdentifiedEffect
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, added_spreads, at_present, fit
@@ -85,7 +85,7 @@ def test_the_tooth_that_is_out_of_place_is_found_on_its_spline(member: str, toot
     fitted = fit(bench, fitted.state, at_present(fitted), prune=False, evaluations=10, after=fitted)
     ((added, covariance, shapes),) = added_spreads(fitted)
     numbers = fitted_numbers(added, covariance, shapes)
-    effect = NamedEffect(
+    effect = IdentifiedEffect(
         name="tooth_error", confidence=1, chance=0, explained=1, parameters=numbers, settings=added.settings()
     )
     said = teeth_found([effect], fitted.state)

@@ -20,7 +20,7 @@ import hdsim
 from hdsim.cli import COMMANDS
 from hdsim.diagnosis.experiments import LONGEST_S
 from hdsim.diagnosis.following import WEAK
-from hdsim.diagnosis.verdict import NamedEffect, Verdict
+from hdsim.diagnosis.verdict import IdentifiedEffect, Verdict
 from hdsim.effects import catalogue
 from hdsim.estimate.check import LONGEST_GAP_S, SLOWEST_HZ
 from hdsim.estimate.found import Gap
@@ -110,7 +110,7 @@ def test_the_page_of_the_diagnosis_has_the_programs_own_figures() -> None:
 def test_the_page_of_the_diagnosis_has_every_field_of_the_verdict() -> None:
     section = (DOCS / "diagnose.md").read_text(encoding="utf-8").split("## verdict.json")[1].split("## ")[0]
     named = set(re.findall(r"`(\w+)`", section))
-    fields = {*Verdict.model_fields, *NamedEffect.model_fields, *Gap.model_fields}
+    fields = {*Verdict.model_fields, *IdentifiedEffect.model_fields, *Gap.model_fields}
     assert fields - named == set()
 
 

@@ -11,7 +11,7 @@ import hdsim.parts
 from hdsim import number
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Inverse, Periodic, Shape
-from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.found import ParameterEstimate
 from hdsim.estimate.numbers import Free, base_freedoms, scaled, undeclared
 from hdsim.estimate.state import Added, number_at, state_of
 from hdsim.estimate.vector import Vector
@@ -104,7 +104,7 @@ def test_every_fitted_field_is_told_in_its_unit(name, fitting):
     for path, one in told.items():
         last = path.rpartition(".")[2]
         assert last in UNITS, f"add the unit of {name}.{path} to this test, from its docstring"
-        row = numbers_table({path: FittedNumber(value=one.value)}).replace("μ", "µ")
+        row = numbers_table({path: ParameterEstimate(value=one.value)}).replace("μ", "µ")
         assert f"<td class='u'>{UNITS[last]}</td>" in row, path
         assert math.isnan(one.low) or one.low <= one.value <= one.high
 

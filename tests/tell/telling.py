@@ -12,7 +12,7 @@ from hdsim.diagnosis.evidence import (
     RestEvidence,
     StageEvidence,
 )
-from hdsim.diagnosis.verdict import NamedEffect, Verdict
+from hdsim.diagnosis.verdict import IdentifiedEffect, Verdict
 from hdsim.estimate.found import Gap
 from hdsim.tell.findings import Findings
 from hdsim.tell.report import write_report
@@ -73,7 +73,7 @@ def told(evidence: Evidence, **changes) -> Findings:
     """Findings as the workflow makes them of the evidence."""
     decision = decide(evidence)
     effects = [
-        NamedEffect(
+        IdentifiedEffect(
             name=evidence.laws[k].name,
             title=evidence.laws[k].name.replace("_", " "),
             confidence=decision.confidence[k],

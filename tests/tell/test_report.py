@@ -14,9 +14,9 @@ from telling import NASTY, page
 
 import hdsim
 from hdsim.diagnosis.further import Candidate, CurveFound, NextExperiment
-from hdsim.diagnosis.verdict import NamedEffect
+from hdsim.diagnosis.verdict import IdentifiedEffect
 from hdsim.diagnosis.workflow import diagnose
-from hdsim.estimate.found import DataProblem, FittedNumber
+from hdsim.estimate.found import DataProblem, ParameterEstimate
 from hdsim.log import read_attachments
 from hdsim.log.info import info_log
 from hdsim.log.layout import split_path
@@ -131,7 +131,7 @@ def test_the_log_holds_all_runs_and_its_layout_shows_only_what_is_there(found, o
 
 
 def test_alternatives_stand_side_by_side_with_what_separates_them(found, tmp_path):
-    effect = NamedEffect(
+    effect = IdentifiedEffect(
         name="torsional_hysteresis_maxwell", title="torsional hysteresis (Maxwell slip)",
         confidence=0.7, chance=0.01, explained=0.5,
         indistinguishable_from=["torsional_hysteresis_duhem"],
@@ -175,8 +175,10 @@ def test_what_has_no_name_is_shown_as_a_curve_with_intervals(found, tmp_path):
 
 def test_moved_and_undetermined_numbers_say_so(found, tmp_path):
     numbers = {
-        "drive.friction.coulomb_nm": FittedNumber(value=0.045, interval=(0.044, 0.046), start=0.03),
-        "drive.inertia.motor_kg_m2": FittedNumber(value=5e-5, start=5e-5, tied_to=["load.inertia_kg_m2"]),
+        "drive.friction.coulomb_nm": ParameterEstimate(value=0.045, interval=(0.044, 0.046), start=0.03),
+        "drive.inertia.motor_kg_m2": ParameterEstimate(
+            value=5e-5, start=5e-5, tied_to=["load.inertia_kg_m2"]
+        ),
     }
     problem = DataProblem(
         record="a", channel="motor_torque", kind="spikes", severity="warning", message="3 <spikes>"

@@ -23,7 +23,7 @@ from telling import (
 from hdsim.diagnosis.evidence import HeldOutEvidence
 from hdsim.diagnosis.further import CurveFound
 from hdsim.diagnosis.verdict import Remainder, TeethFound
-from hdsim.estimate.found import FittedNumber
+from hdsim.estimate.found import ParameterEstimate
 from hdsim.tell.wording import farthest, headline, meaning, much_left, sureness
 
 FRICTION = "drive.friction.coulomb_nm"
@@ -102,7 +102,7 @@ def test_little_that_is_left_is_not_much():
 
 
 def test_numbers_that_are_far_off_are_not_very_sure_while_much_is_left():
-    number = FittedNumber(value=0.045, interval=(0.0449, 0.0451), start=0.03)
+    number = ParameterEstimate(value=0.045, interval=(0.0449, 0.0451), start=0.03)
     fields = {"parameters": {FRICTION: number}, "moved": [FRICTION]}
     assert sureness(told(PARAMETER, **fields)).words == "Very sure"
     left = told(PARAMETER.model_copy(update={"rest": rest(3.0)}), **{"verdict": "parameter"} | fields)
@@ -216,13 +216,13 @@ def test_nothing_is_said_with_what_is_left(tmp_path):
 
 def test_what_the_data_make_doubtful_comes_first():
     for evidence in KINDS.values():
-        fields = {"parameters": {FRICTION: FittedNumber(value=1.0)}, "moved": [FRICTION]}
+        fields = {"parameters": {FRICTION: ParameterEstimate(value=1.0)}, "moved": [FRICTION]}
         found = told(evidence, sentence="Check the data first: a: b is c. And so on.", **fields)
         assert headline(found).startswith("Check the data first (below). ")
 
 
 def test_a_number_that_is_off_is_said_though_no_interval_excludes_it():
-    number = FittedNumber(value=1.3, interval=(0.9, 1.8), start=1.0)
+    number = ParameterEstimate(value=1.3, interval=(0.9, 1.8), start=1.0)
     found = told(PARAMETER, parameters={"motor_torque_gain": number}, moved=["motor_torque_gain"])
     assert "most simply motor torque gain" in headline(found)
     sure = sureness(found)
@@ -233,13 +233,13 @@ def test_a_number_that_is_off_is_said_though_no_interval_excludes_it():
 def test_how_far_a_number_moved_is_in_standard_errors_of_its_logarithm():
     width = 0.02  # standard deviation of the logarithm
     bounds = (0.04 * np.exp(-2 * width), 0.04 * np.exp(2 * width))
-    number = FittedNumber(value=0.04, interval=bounds, start=0.04 * np.exp(-5 * width))
+    number = ParameterEstimate(value=0.04, interval=bounds, start=0.04 * np.exp(-5 * width))
     found = told(PARAMETER, parameters={"x": number}, moved=["x"])
     assert farthest(found.verdict) == pytest.approx(5.0)
 
 
 def test_a_number_without_a_spread_is_infinitely_far_and_does_not_crash():
-    number = FittedNumber(value=0.04, interval=(0.04, 0.04), start=0.03)
+    number = ParameterEstimate(value=0.04, interval=(0.04, 0.04), start=0.03)
     found = told(PARAMETER, parameters={FRICTION: number}, moved=[FRICTION])
     assert math.isinf(farthest(found.verdict))
     assert sureness(found).number == "over 100 standard errors"
