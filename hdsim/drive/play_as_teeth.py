@@ -23,6 +23,8 @@ from hdsim.nested import merge
 
 #: Largest roughness that a flank may have, m: the bound of its field.
 _ROUGHEST_M = 1e-3
+#: Largest factor by which gaps may be worn apart: the bound of ``gap_factor``.
+_WIDEST = 1000.0
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,10 @@ def play_as_teeth(drive: Drive, play_rad: float, *, seed: int = 0) -> PlayAsTeet
     }
     if not 0.0 < max(roughness.values()) < _ROUGHEST_M:
         raise PhysicsError(f"no roughness of flanks leaves a half-gap of {1e6 * half_gap:.3g} um")
+    if heights > _WIDEST:
+        raise PhysicsError(
+            f"a half-gap of {1e6 * half_gap:.4g} um is {heights:.4g} times that of the flanks: no gear has it"
+        )
     torsion = drive.torsion
     softer = 1.0 / torsion.stiffness_k1_nm_per_rad + 0.5 * play_rad / torsion.torque_t1_nm
     new: dict[str, Any] = given.get("flanks", {}) | {

@@ -178,10 +178,17 @@ class Findings:
         """Share of the systematic residual that the identified effects do not explain; 0 without one.
 
         The evidence counts all that the search has added: what only the others explain is unexplained, too.
+        How much that is, held-out data say: the power beyond the noise of all channels, each over its noise.
         """
         if not (self.verdict.effects and self.evidence.laws):
             return 0.0
-        return min(1.0 - self.evidence.explained + sum(law.gain for law in self.not_believed), 1.0)
+        found = 1.0 - self.evidence.explained
+        gaps = [gap for gap in self.verdict.gap.values() if gap.noise > 0.0]
+        if self.not_believed and gaps:
+            first = sum(max((gap.refit / gap.noise) ** 2 - 1.0, 0.0) for gap in gaps)
+            last = sum(max((gap.after / gap.noise) ** 2 - 1.0, 0.0) for gap in gaps)
+            found = max(found, last / first) if first > 0.0 else found
+        return min(found, 1.0)
 
     @property
     def other_shape(self) -> tuple[float, PlaceEvidence] | None:

@@ -80,11 +80,11 @@ def test_what_only_an_effect_without_a_name_explains_is_left_too():
     unsure = law("unbalance", gain=0.15, sampled=0.4, needed=0.1, own_left=0.9)
     found = told(EFFECT.model_copy(update={"laws": [*EFFECT.laws, unsure], "explained": 0.99}))
     assert [effect.name for effect in found.verdict.effects] == ["motor_torque_ripple"]
-    gap = GAP.model_copy(update={"after": 2.5 * GAP.noise})
+    gap = GAP.model_copy(update={"refit": 5.0 * GAP.noise, "after": 2.5 * GAP.noise})
     found = type(found)(found.verdict.model_copy(update={"gap": {"motor_torque": gap}}), found.evidence)
     assert (
         much_left(found)
-        == "2.5 times the noise of the motor torque and 16\u00a0% of the systematic residual remain"
+        == "2.5 times the noise of the motor torque and 22\u00a0% of the systematic residual remain"
     )
     assert sureness(found).words != "Very sure"
 
