@@ -17,7 +17,7 @@ import numpy as np
 from hdsim.diagnosis.name import Named
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
-from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.fit import Fit, at_present, fit, settled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import together
 
@@ -49,7 +49,7 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
                 if len(named) > 2 and one.needed >= NEEDLESS:
                     # Of two names neither can have been needed for the sake of the other alone.
                     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-                        rest = fit(bench, rest.state, at_present(rest), prune=False, after=rest, rough=True)
+                        rest = settled(bench, rest)
                     one.needed = needed(bench, rest, current)
                 one.worth = bench.power(rest.predictions) - bench.power(current.predictions)
             others.append(rest)

@@ -79,14 +79,9 @@ def minimised(
 
     def whole(x: Array, columns: Array) -> Array:
         """Derivatives and, last, values of all that is minimised, in p + 1 rows of the same products."""
-        rest, away = residual(x), (x - centre) / priors
-        products = np.empty((len(x) + 1, len(x) + 1))
-        products[:-1, :-1] = worth**2 * (columns.T @ columns) + np.diag(priors**-2)
-        products[:-1, -1] = products[-1, :-1] = away / priors - worth**2 * (columns.T @ rest)
-        products[-1, -1] = length(x) ** 2
-        sizes = np.sqrt(np.maximum(np.diag(products), 1e-300))
-        powers, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
-        return np.asarray(np.sqrt(np.maximum(powers, 0.0))[:, None] * vectors.T * sizes)
+        both = np.column_stack([-worth * columns, worth * residual(x)])
+        beliefs = np.column_stack([np.diag(1.0 / priors), (x - centre) / priors])
+        return np.asarray(np.linalg.qr(np.vstack([both, beliefs]), mode="r"))
 
     def length(x: Array) -> float:
         return math.hypot(

@@ -192,7 +192,12 @@ class Findings:
 
     @property
     def other_shape(self) -> tuple[float, PlaceEvidence] | None:
-        """That share and its regressor, where it is significant; None else."""
+        """That share and its regressor, where it is significant; None else.
+
+        Where the search has added more than is identified its last residual is not that of the identified.
+        """
+        if self.not_believed:
+            return None
         places = self.evidence.stages[-1].places if self.evidence.stages else []
         left = 1.0 - self.evidence.explained
         real = self.evidence.left_chance <= RULES.chance and left >= LEAST_REST and self.unexplained > 0.0
