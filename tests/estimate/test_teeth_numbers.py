@@ -93,7 +93,7 @@ def fitted(
     base = scenario(mesh)
     state = state_of(base)
     values = {path: undeclared(state, path, 0.0).value * factor for path, factor in changes.items()}  # type: ignore[union-attr]
-    # The plant sums its teeth, as a fit does those that it moves: a table of them is off by more than this noise.
+    # The plant sums its teeth, as a fit does those that it moves: a table is off by more than this noise.
     plant = scenario({"model": "teeth"} | mesh).with_(values)
     return hdsim.fit([record(plant, times)], base, free=paths, load="load_torque")
 
