@@ -104,8 +104,10 @@ def test_twelve_bases_get_one_verdict(tmp_path, k, friction, arm):
     assert "kinematic_error" in {first.name, *first.indistinguishable_from}
     assert first.name in {"sensors", "kinematic_error"}
     assert second_arcsec(first) == pytest.approx(SECOND_ARCSEC, rel=0.1)
-    # Nothing else but errors over the wave generator's angle, by either name.
-    assert {effect.name for effect in effects} <= {"sensors", "kinematic_error"}
+    # Nothing else but errors over the wave generator's angle, by either name, and friction where the base has
+    # none: the joint turns one way, so whether it is told from the current's zero is even odds.
+    lacking = set() if friction else {"input_coulomb_viscous"}
+    assert {effect.name for effect in effects} <= {"sensors", "kinematic_error"} | lacking
     orders = [order for place in found.located if place.channel == "output_angle" for order in place.orders]
     named = [item for effect in effects for item in effect.parameters.items()]
     orders += [number.value for path, number in named if path.endswith("order")]
