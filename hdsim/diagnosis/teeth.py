@@ -12,15 +12,13 @@ from hdsim.diagnosis.verdict import IdentifiedEffect, TeethFound
 from hdsim.drive.parameters import LumpedMesh, ToothedMesh
 from hdsim.drive.play_as_teeth import PlayAsTeeth, half_gap_of_play, play_as_teeth
 from hdsim.effects import catalogue
+from hdsim.effects._kernels import ARCMIN
 from hdsim.errors import PhysicsError
 from hdsim.estimate.found import ParameterEstimate
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
     from hdsim.parts import OfTeeth
-
-#: Radians in an arc minute.
-_ARCMIN = math.pi / 10800.0
 
 
 def teeth_found(effects: Sequence[IdentifiedEffect], state: State) -> TeethFound | None:
@@ -76,7 +74,7 @@ def _gap(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State)
     if of.says == "growth":
         gaps = [1e6 * start * (1.0 + end) for end in ends]
     else:
-        gaps = [1e6 * (start + of.play_arcmin * half_gap_of_play(drive, end * _ARCMIN)) for end in ends]
+        gaps = [1e6 * (start + of.play_arcmin * half_gap_of_play(drive, end * ARCMIN)) for end in ends]
     found.half_gap_um = ParameterEstimate(
         value=gaps[0], interval=(min(gaps[1:]), max(gaps[1:])) if gaps[1:] else None, start=1e6 * start
     )
@@ -89,7 +87,7 @@ def _gap(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State)
 def _play(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State) -> None:
     """What a play means in teeth, and the drive with teeth that has it."""
     play = effect.parameters[of.field]
-    ends = [of.play_arcmin * end * _ARCMIN for end in (play.value, *(play.interval or ()))]
+    ends = [of.play_arcmin * end * ARCMIN for end in (play.value, *(play.interval or ()))]
     gaps = [1e6 * half_gap_of_play(state.drive, end) for end in ends]
     found.half_gap_um = ParameterEstimate(value=gaps[0], interval=(gaps[1], gaps[2]) if gaps[1:] else None)
     radius = 1e3 * state.drive.geometry.pitch_radius_m
@@ -137,7 +135,7 @@ def toothed_changes(effects: Sequence[IdentifiedEffect], state: State) -> dict[s
         of = catalogue()[effect.name].of_teeth
         if of is None or of.play_arcmin <= 0.0 or of.field not in effect.parameters:
             continue
-        play = of.play_arcmin * effect.parameters[of.field].value * _ARCMIN
+        play = of.play_arcmin * effect.parameters[of.field].value * ARCMIN
         try:
             teeth = play_as_teeth(state.drive, play, seed=state.seed)
         except PhysicsError:

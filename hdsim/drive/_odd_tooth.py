@@ -53,6 +53,35 @@ def partner(p, at, ring, output):  # type: ignore[no-untyped-def]
 
 
 @_jit
+def difference(p, at, x, angles):  # type: ignore[no-untyped-def]
+    """Number of the odd pair's tooth and, with its share, what ``pair_potential`` returns beyond the drawn.
+
+    Args:
+        p: the mesh's numbers.
+        at: where the odd tooth stands in them.
+        x: common displacement, m.
+        angles: of motor, ring and output, rad.
+    """
+    tooth = partner(p, at, angles[1], angles[2])
+    phi = tooth * (2.0 * math.pi / p[TEETH]) + angles[1] - angles[0]
+    phi -= math.pi * math.floor(phi / math.pi + 0.5)
+    c2, s2 = math.cos(2.0 * phi), math.sin(2.0 * phi)
+    drawn = pair_potential(p, x, phi, c2, s2, tooth, 0.0, 0.0)
+    odd = pair_potential(p, x, phi, c2, s2, tooth, p[at + ODD_SHIFT], p[at + ODD_WIDENED])
+    share = p[at + ODD_SHARE]
+    return (
+        tooth,
+        share * (odd[0] - drawn[0]),
+        share * (odd[1] - drawn[1]),
+        share * (odd[2] - drawn[2]),
+        share * (odd[3] - drawn[3]),
+        share * (odd[4] - drawn[4]),
+        share * (odd[5] - drawn[5]),
+        share * (odd[6] - drawn[6]),
+    )
+
+
+@_jit
 def odd_potential(p, x, angles, local):  # type: ignore[no-untyped-def]
     """The teeth's potential and its derivatives with those of the teeth that differ.
 
@@ -63,36 +92,21 @@ def odd_potential(p, x, angles, local):  # type: ignore[no-untyped-def]
         local: what ``teeth_potential`` or a table of it returns there.
     """
     v, v_x, v_xx, v_a, v_aa, v_xa, engaged = local
-    pitch = 2.0 * math.pi / p[TEETH]
     for k in range(int(p[ODD_COUNT])):
-        at = int(p[ODD_AT]) + PER_ODD * k
-        tooth = partner(p, at, angles[1], angles[2])
-        phi = tooth * pitch + angles[1] - angles[0]
-        phi -= math.pi * math.floor(phi / math.pi + 0.5)
-        c2, s2 = math.cos(2.0 * phi), math.sin(2.0 * phi)
-        drawn = pair_potential(p, x, phi, c2, s2, tooth, 0.0, 0.0)
-        odd = pair_potential(p, x, phi, c2, s2, tooth, p[at + ODD_SHIFT], p[at + ODD_WIDENED])
-        share = p[at + ODD_SHARE]
-        v += share * (odd[0] - drawn[0])
-        v_x += share * (odd[1] - drawn[1])
-        v_xx += share * (odd[2] - drawn[2])
-        v_a += share * (odd[3] - drawn[3])
-        v_aa += share * (odd[4] - drawn[4])
-        v_xa += share * (odd[5] - drawn[5])
-        engaged += share * (odd[6] - drawn[6])
+        more = difference(p, int(p[ODD_AT]) + PER_ODD * k, x, angles)
+        v += more[1]
+        v_x += more[2]
+        v_xx += more[3]
+        v_a += more[4]
+        v_aa += more[5]
+        v_xa += more[6]
+        engaged += more[7]
     return v, v_x, v_xx, v_a, v_aa, v_xa, engaged
 
 
 @_jit
 def odd_forces(p, x, angles, forces):  # type: ignore[no-untyped-def]
     """Add to every tooth's normal force (N) what it differs by; arguments as ``odd_potential``."""
-    pitch = 2.0 * math.pi / p[TEETH]
     for k in range(int(p[ODD_COUNT])):
-        at = int(p[ODD_AT]) + PER_ODD * k
-        tooth = partner(p, at, angles[1], angles[2])
-        phi = tooth * pitch + angles[1] - angles[0]
-        phi -= math.pi * math.floor(phi / math.pi + 0.5)
-        c2, s2 = math.cos(2.0 * phi), math.sin(2.0 * phi)
-        drawn = pair_potential(p, x, phi, c2, s2, tooth, 0.0, 0.0)
-        odd = pair_potential(p, x, phi, c2, s2, tooth, p[at + ODD_SHIFT], p[at + ODD_WIDENED])
-        forces[tooth] += p[at + ODD_SHARE] * (odd[1] - drawn[1])
+        more = difference(p, int(p[ODD_AT]) + PER_ODD * k, x, angles)
+        forces[more[0]] += more[2]

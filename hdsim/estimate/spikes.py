@@ -10,6 +10,7 @@ import numpy as np
 
 from hdsim.estimate.noise import noise_floor
 from hdsim.estimate.records import Array, Mask
+from hdsim.log.outliers import runs_of
 
 #: Deviations beyond which a sample is a spike, in standard deviations of the noise.
 SPIKE_DEVIATIONS = 12.0
@@ -72,5 +73,4 @@ def saturated(values: Array, trusted: Mask) -> Mask:
 
 def longest_run(flags: Mask) -> int:
     """Length of the longest run of true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
+    return max((last - first for first, last in runs_of(flags)), default=0)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hdsim.log.outliers import runs_of
 from hdsim.plot import style, units
 from hdsim.tell.words import UNKNOWN, spoken, unit_of
 
@@ -200,9 +201,8 @@ def _unit(series: Compared, *curves: Array) -> units.Unit:
 
 
 def _runs(flags: Mask, least: int = 20) -> list[tuple[int, int]]:
-    """First sample of each run of true, and the one after its last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
+    """First sample of each run of true that is long enough, and the one after its last."""
+    return [(a, b) for a, b in runs_of(flags) if b - a >= least]
 
 
 def worst_stretch(time: Array, off: Sequence[Array], hold: Mask) -> slice:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.log.outliers import runs_of
 from hdsim.recording import Recording
 
 Array = NDArray[np.float64]
@@ -19,8 +20,7 @@ ARCSEC = 180.0 * 3600.0 / math.pi
 
 def stretches(mask: NDArray[np.bool_]) -> list[slice]:
     """Runs of true samples, in order."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [slice(first, last) for first, last in runs_of(mask)]
 
 
 def one_way_turn(recording: Recording, ratio: float, direction: int) -> slice:
