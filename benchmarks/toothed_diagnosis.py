@@ -77,11 +77,7 @@ def main() -> None:
     spent = time.process_time() - began
     print(f"{given.mesh}: {spent:.1f} processor seconds, {found.verdict.verdict}")
     for effect in found.verdict.effects:
-        print(
-            f"  named: {effect.name} {effect.settings}"
-            if hasattr(effect, "settings")
-            else f"  named: {effect}"
-        )
+        print(f"  named: {effect.name} {effect.settings}")
     for channel, gap in found.verdict.gap.items():
         print(f"  gap {channel}: {gap}")
     print(found.verdict.seconds)

@@ -104,7 +104,8 @@ def below(chance: float) -> str:
     """A probability in percent; below 0.5 % it is given as a bound, as the draws resolve no less."""
     if not math.isfinite(chance):
         return UNKNOWN
-    return f"less than {100 * chance:.2g}\u00a0%" if chance <= 0.005 else f"{100 * chance:.2g}\u00a0%"
+    said = f"{100 * chance:.0f}" if chance >= 0.1 else f"{100 * chance:.2g}"
+    return f"less than {said}\u00a0%" if chance <= 0.005 else f"{said}\u00a0%"
 
 
 def of_ten(probability: float) -> str:

@@ -6,7 +6,7 @@ from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Harmonic, Inverse
 from hdsim.estimate.numbers import base_freedoms
 from hdsim.estimate.state import state_of
-from hdsim.tell.words import named_number, of_ten, shown
+from hdsim.tell.words import below, named_number, of_ten, shown
 
 #: Unit of every number that a fit of the catalogue or of a model may report, written down by hand.
 EXPECTED = {
@@ -165,3 +165,12 @@ def test_paths_become_words_and_units():
 )  # fmt: skip
 def test_a_probability_is_so_many_of_ten_or_of_more(probability, text):
     assert of_ten(probability) == text
+
+
+def test_a_certain_chance_is_a_hundred_per_cent():
+    assert [below(chance) for chance in (1.0, 0.126, 0.0123, 0.005)] == [
+        "100\u00a0%",
+        "13\u00a0%",
+        "1.2\u00a0%",
+        "less than 0.5\u00a0%",
+    ]
