@@ -28,6 +28,7 @@ from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array, Mask
 from hdsim.estimate.state import State
 from hdsim.log.mapping import MEASURED
+from hdsim.plot import units
 
 #: Most lines of a channel that are tracked, and bands of speed in each record and direction.
 MOST_LINES, BANDS = 3, 6
@@ -307,11 +308,12 @@ def _sentence(found: TrackedOrder) -> str:
         words += f" (as its power {found.exponent:.2g}, {low:.2g} to {high:.2g})"
     spoken = found.channel.replace("_", " ")
     records = list(dict.fromkeys(band.record for band in found.bands))
+    unit = units.for_error(found.amplitude) if found.unit == "rad" else units.Unit(found.unit, 1.0)
     sizes = []
     for name in records:
         own = [band for band in found.bands if band.record == name]
         mean = np.average([b.amplitude for b in own], weights=[b.periods for b in own])
-        sizes.append(f"{mean:.3g} {found.unit}{f' in {name}' if len(records) > 1 else ''}")
+        sizes.append(f"{unit.factor * mean:.3g} {unit.name}{f' in {name}' if len(records) > 1 else ''}")
     repeats = f"{100 * found.steady:.0f} % of its power repeats itself from period to period"
     return f"order {found.order:.4g} of the {spoken}, {' and '.join(sizes)}, {words}; {repeats}"
 

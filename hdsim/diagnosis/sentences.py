@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hdsim.diagnosis.decide import Decision
-from hdsim.diagnosis.evidence import Evidence
+from hdsim.diagnosis.evidence import Evidence, PlaceEvidence
 from hdsim.diagnosis.locate import SHARP
 from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.remainder import remainder
@@ -55,14 +55,22 @@ def without_a_place(bench: Bench, last: Fit, common: Mapping[str, Any]) -> Verdi
     )
 
 
-def rest_words(last: Stage, evidence: Evidence) -> str:
-    """What the names leave, with its place; nothing where it may be chance."""
+def other_shape(evidence: Evidence) -> tuple[float, PlaceEvidence] | None:
+    """Share of the systematic residual left by the search, and its regressor; None where it may be chance."""
+    places = evidence.stages[-1].places if evidence.stages else []
     left = 1.0 - evidence.explained
-    if evidence.left_chance > RULES.chance or left < LEAST_REST or not last.location.places:
+    if evidence.left_chance > RULES.chance or left < LEAST_REST or not places:
+        return None
+    return left, places[0]
+
+
+def rest_words(evidence: Evidence) -> str:
+    """What the names leave, with its place; nothing where it may be chance."""
+    rest = other_shape(evidence)
+    if rest is None:
         return ""
-    place = last.location.places[0]
-    coordinate = place.coordinate.replace("_", " ")
-    return f" {100 * left:.0f} % of the systematic residual remains, a function of the {coordinate}."
+    coordinate = rest[1].coordinate.replace("_", " ")
+    return f" {100 * rest[0]:.0f} % of the systematic residual remains, a function of the {coordinate}."
 
 
 def numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:

@@ -238,7 +238,7 @@ def _diagnosed(
         effects = named_effects(named, decision, current)
         words = " and ".join(effect_words(effect) for effect in effects)
         # With more added than is believed, the last residual is not that of the believed.
-        rest = rest_words(found.stages[-1], evidence) if len(named) == len(found.named) else ""
+        rest = rest_words(evidence) if len(named) == len(found.named) else ""
         sentence = f"The model is missing {words}.{rest}"
         teeth = teeth_found(effects, current.state)
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)

@@ -17,7 +17,7 @@ import numpy as np
 from hdsim.diagnosis.coordinates import coordinates
 from hdsim.diagnosis.evidence import Evidence, LawEvidence, PlaceEvidence, StageEvidence
 from hdsim.diagnosis.rules import RULES
-from hdsim.diagnosis.sentences import LEAST_REST
+from hdsim.diagnosis.sentences import other_shape
 from hdsim.diagnosis.verdict import Remainder, Verdict
 from hdsim.estimate.orders import Line, order_lines
 from hdsim.estimate.prove import held_out_gap
@@ -196,12 +196,9 @@ class Findings:
 
         Where the search has added more than is identified its last residual is not that of the identified.
         """
-        if self.not_believed:
+        if self.not_believed or self.unexplained == 0.0:
             return None
-        places = self.evidence.stages[-1].places if self.evidence.stages else []
-        left = 1.0 - self.evidence.explained
-        real = self.evidence.left_chance <= RULES.chance and left >= LEAST_REST and self.unexplained > 0.0
-        return (left, places[0]) if real and places else None
+        return other_shape(self.evidence)
 
     @property
     def left_most(self) -> tuple[str, float]:

@@ -20,16 +20,16 @@ def sweeps():
     return [(cumulative_trapezoid(w, TIME, initial=0.0), w) for w in (up, -(12.0 + 8.0 * TIME))]
 
 
-def told(torques, seed, noise=0.005):
-    """What is told of the order that stands out of torques beside the two sweeps."""
+def told(values, seed, noise=0.005, channel="motor_torque"):
+    """What is told of the order that stands out of a channel beside the two sweeps."""
     rng = np.random.default_rng(seed)
-    noisy = [torque + noise * rng.standard_normal(len(TIME)) for torque in torques]
+    noisy = [one + noise * rng.standard_normal(len(TIME)) for one in values]
     records = [
-        Record(f"run {k}", TIME, {"motor_angle": angle, "motor_torque": torque})
-        for k, ((angle, _), torque) in enumerate(zip(sweeps(), noisy, strict=True))
+        Record(f"run {k}", TIME, {"motor_angle": angle, channel: one})
+        for k, ((angle, _), one) in enumerate(zip(sweeps(), noisy, strict=True))
     ]
     bench = Bench(predictors(records, RATIO))
-    [line] = order_lines(bench, noisy, "motor_torque", most=1)
+    [line] = order_lines(bench, noisy, channel, most=1)
     assert line.order == pytest.approx(ORDER, abs=0.05)
     return over_speed(bench, noisy, line)
 
@@ -41,6 +41,13 @@ def test_a_period_has_the_amplitude_and_phase_of_its_wave_beside_a_slope():
     assert len(waves) > 90
     assert np.abs(waves) == pytest.approx(0.3, rel=0.02)
     assert np.angle(waves) == pytest.approx(0.7 - np.pi / 2, abs=0.03)
+
+
+def test_an_angle_is_told_in_arcsec():
+    errors = [5e-5 * np.sin(ORDER * angle) for angle, _ in sweeps()]
+    found = told(errors, 0, noise=1e-7, channel="output_angle")
+    assert found.unit == "rad"
+    assert "10.3 arcsec in run 0" in found.sentence
 
 
 @pytest.mark.parametrize("seed", range(12))
