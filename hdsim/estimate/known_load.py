@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdsim.errors import InputError
-from hdsim.estimate.spline import smoothed
+from hdsim.estimate.noise import quantisation_step
+from hdsim.estimate.spline import drawn_anew, smoothed
 
 if TYPE_CHECKING:
     from hdsim.actuation.arm import Arm, Course
@@ -27,7 +28,7 @@ class Gravity:
             self.load.gravity.contribute(build)
 
 
-def arm_course(record: Record, arm: Arm) -> Course:
+def arm_course(record: Record, arm: Arm, rng: np.random.Generator | None = None) -> Course:
     """What the drive's joint carries of an arm along a record: the other joints move as they were measured.
 
     Where a joint was not measured it moves as the arm's ``joints`` says.
@@ -35,6 +36,7 @@ def arm_course(record: Record, arm: Arm) -> Course:
     Args:
         record: the measured run, with the angles of other joints.
         arm: the arm.
+        rng: draws the other joints' readings anew, with their noise; None takes them as read.
 
     Raises:
         InputError: a measured joint is not the arm's, or the motion of one is neither measured nor given.
@@ -57,5 +59,9 @@ def arm_course(record: Record, arm: Arm) -> Course:
     for name, values in record.joints.items():
         breaks, coefficients = smoothed(record.time, values, motion=True)
         angle = PPoly(coefficients[::-1], breaks)
+        if rng is not None:
+            step = quantisation_step(values)
+            drawn = drawn_anew(record.time, values, angle(record.time), breaks, step, rng)
+            angle = angle if drawn is None else PPoly(drawn[::-1], breaks)
         motions[name] = np.array([angle(times), angle(times, 1), angle(times, 2)])
     return arm.along(times, motions)

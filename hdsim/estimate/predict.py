@@ -18,12 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdsim.errors import PhysicsError
-from hdsim.estimate.knots import least_squares_spline
 from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import SlowPart, pieces_of, signal, smoothed, spline_through
+from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
@@ -104,7 +103,8 @@ class Predictor:
             #: What the sensor that is the load is compared with, shape (n,).
             self.slow_torque = self._slow.of(record.filled("output_torque"))
         #: Of an arm; a torque sensor that is the load has it in its reading.
-        self.course = arm_course(record, arm) if arm is not None and plan.load != "output_torque" else None
+        self._arm = arm if plan.load != "output_torque" else None
+        self.course = None if self._arm is None else arm_course(record, self._arm)
         self.ratio = ratio
         self.runs = 0
         #: Of drives with teeth (``hdsim.estimate.short_cut``): no short cut; whose teeth are in a table.
@@ -127,36 +127,27 @@ class Predictor:
     def disturbed(self, seed: int = 0) -> Predictor:
         """The same record with the motion as another reading would have given it (parametric bootstrap).
 
-        A reading of the smooth motion is drawn, with the noise and the steps of the sensor, and smoothed over
-        the same knots: what a prediction changes by is what the motion's own noise does to it.
+        What a prediction changes by is what the noise of the motion and of an arm's other joints does to it.
 
         Args:
             seed: of the draw.
         """
+        rng = np.random.default_rng([seed, 11])
         found = copy(self)
-        if self._likeliest is not None:
-            _, coefficients = pieces_of(self._likeliest.disturbed(np.random.default_rng([seed, 11])))
+        coefficients = self._drawn(rng)
+        if coefficients is not None:
             found._coefficients = self._factor * coefficients
             found.turn(0.0)
-            return found
-        time, raw = self.record.time, self._reading
-        smooth = self.motor_angle / self._factor
-        step = self._step(self.plan.motion)
-        # A loop's hiccup is no noise of the sensor: the median does not see it.
-        rest = raw - smooth
-        left = min(float(np.var(rest)), float(np.median(np.abs(rest)) / 0.6745) ** 2)
-        white = np.sqrt(max(left - step**2 / 12.0, 0.0))
-        drawn = smooth + white * np.random.default_rng([seed, 11]).standard_normal(len(raw))
-        drawn = np.round(drawn / step) * step if step > 0 else drawn
-        breaks = self._breaks
-        knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
-        try:
-            again = least_squares_spline(time, drawn, knots)
-        except (ValueError, np.linalg.LinAlgError):
-            return found  # a knot a sample, as of a motion without noise
-        found._coefficients = self._factor * pieces_of(again)[1]
-        found.turn(0.0)
+        if self._arm is not None:
+            found.course = arm_course(self.record, self._arm, rng)
         return found
+
+    def _drawn(self, rng: np.random.Generator) -> Array | None:
+        """Coefficients (4, k) of the motion's reading drawn anew; None where it has no noise."""
+        if self._likeliest is not None:
+            return pieces_of(self._likeliest.disturbed(rng))[1]
+        smooth, step = self.motor_angle / self._factor, self._step(self.plan.motion)
+        return drawn_anew(self.record.time, self._reading, smooth, self._breaks, step, rng)
 
     def _step(self, channel: str) -> float:
         """Step of a channel's sensor, as it is felt in the record."""

@@ -95,6 +95,35 @@ def spline_through(
     return chosen, None
 
 
+def drawn_anew(
+    time: Array, values: Array, smooth: Array, breaks: Array, step: float, rng: np.random.Generator
+) -> Array | None:
+    """Cubic coefficients (4, k), over the same knots, of a reading drawn about a spline with its noise.
+
+    Args:
+        time: shape (n,), s.
+        values: as read, shape (n,).
+        smooth: the spline through them, shape (n,).
+        breaks: its knots, shape (k + 1,).
+        step: q of the sensor.
+        rng: of the draw.
+
+    Returns:
+        None where a knot a sample leaves no noise to be seen.
+    """
+    # A loop's hiccup is no noise of the sensor: the median does not see it.
+    rest = values - smooth
+    left = min(float(np.var(rest)), float(np.median(np.abs(rest)) / 0.6745) ** 2)
+    white = np.sqrt(max(left - step**2 / 12.0, 0.0))
+    drawn = smooth + white * rng.standard_normal(len(values))
+    drawn = np.round(drawn / step) * step if step > 0 else drawn
+    knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
+    try:
+        return pieces_of(least_squares_spline(time, drawn, knots))[1]
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+
+
 def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[float, BSpline | None]:
     """The least-squares spline that ``spline_through`` takes, with its score; None where none can be made."""
     n = len(time)

@@ -6,7 +6,8 @@ import pytest
 import hdsim
 from hdsim.cli import main
 from hdsim.diagnosis.workflow import diagnose
-from hdsim.estimate.records import record_from
+from hdsim.estimate.predict import predictors
+from hdsim.estimate.records import Record, record_from
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pinocchio")
@@ -54,6 +55,29 @@ def test_measured_joints_are_kept_in_a_log(tmp_path):
     again = record_from(hdsim.open_log(tmp_path / "run.mcap"))
     for name, values in record_from(recording).joints.items():
         assert np.array_equal(again.joints[name], values)
+
+
+@pytest.mark.parametrize("joint", [1, 3])
+def test_the_noise_of_other_joints_is_known_as_noise_of_the_load(tmp_path, joint):
+    """Drawing them anew changes the load as much as reading them again does (parametric bootstrap)."""
+    time, motion = plant.motions(8.0, 0)
+    arm = hdsim.load_scenario(plant.model(tmp_path, joint, plant.MASS)).load.arm
+    own = {"motor_angle": plant.RATIO * motion[0, :, joint], "motor_torque": np.sin(time)}
+
+    def read(seed):
+        noise = 2e-4 * np.random.default_rng(seed).standard_normal((len(time), 6))
+        angles = motion[0] + noise
+        others = {f"joint_{k + 1}": angles[:, k] for k in range(6) if k != joint}
+        return predictors([Record("run", time, own, joints=others)], plant.RATIO, arm=arm)[0]
+
+    def load(predictor):
+        return predictor.course.torque(arm, time, motion[:, :, joint])[100:-100]
+
+    once = read(4)
+    apart = np.mean([np.var(load(read(seed)) - load(once)) / 2 for seed in (5, 6, 7)])
+    drawn = np.mean([np.var(load(once.disturbed(seed)) - load(once)) for seed in (0, 1, 2)])
+    # Other readings choose other knots.
+    assert 0.6 < np.sqrt(drawn / apart) < 1.6
 
 
 @pytest.mark.slow
