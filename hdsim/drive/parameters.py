@@ -120,15 +120,21 @@ class Friction(Parameters):
     smoothing_velocity_rad_per_s: float = Field(STICKS_RAD_PER_S, gt=0)
     """Motor speed over which sign(speed) is smoothed, rad/s. The default sticks."""
 
-    def resolved(self) -> Friction:
+    @property
+    def sticks(self) -> bool:
+        """Whether the drive sticks at rest; with another smoothing speed than the default it creeps."""
+        return self.smoothing_velocity_rad_per_s == STICKS_RAD_PER_S
+
+    def resolved(self, speed: float = RESOLVED_RAD_PER_S) -> Friction:
         """The same with a sign that a measured speed or a linear model can resolve, unless one was chosen.
 
         A speed from an encoder crosses zero many times while the shaft stands; a sharp sign would make
         friction torque of that noise. At rest the slope of a sharp sign is a wall.
+
+        Args:
+            speed: over which the sign is smoothed then, rad/s.
         """
-        if self.smoothing_velocity_rad_per_s != STICKS_RAD_PER_S:
-            return self
-        return self.model_copy(update={"smoothing_velocity_rad_per_s": RESOLVED_RAD_PER_S})
+        return self.model_copy(update={"smoothing_velocity_rad_per_s": speed}) if self.sticks else self
 
 
 class WindowEngagement(Parameters):
@@ -234,9 +240,9 @@ class Drive(Parameters):
 
         return _merged(preset(given["preset"]), given)
 
-    def resolved(self) -> Drive:
+    def resolved(self, speed: float = RESOLVED_RAD_PER_S) -> Drive:
         """The drive as predictions along measured motions and linear models see it: ``Friction.resolved``."""
-        return self.model_copy(update={"friction": self.friction.resolved()})
+        return self.model_copy(update={"friction": self.friction.resolved(speed)})
 
     def settled(self) -> Drive:
         """The same with the ring in static balance, where next to nothing damps it.

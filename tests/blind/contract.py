@@ -29,12 +29,15 @@ class Measured:
         time: shape (n,), s, as stamped.
         channels: shape (n,) each.
         ideal: the same channels without the sensors' noise and quantisation, where the family knows them.
+        followed: what the plant itself leaves of each channel when its motor is moved as the readings tell,
+            root mean square, where the family asks: no model does better.
     """
 
     name: str
     time: np.ndarray
     channels: dict[str, np.ndarray]
     ideal: dict[str, np.ndarray] = field(default_factory=dict)
+    followed: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ from drawing import (
     visible,
 )
 from moving import MOTIONS
-from toothed_plant import LOG_HZ, STANDING_S, TOLD_HZ, Effects, Teeth, Told, simulate, told
+from toothed_plant import LOG_HZ, STANDING_S, TOLD_HZ, Effects, Teeth, Told, followed, simulate, told
 
 from hdsim.errors import PhysicsError
 from hdsim.simulation.run import RunFailed
@@ -250,7 +250,11 @@ def _drawn(number: int, seed: int, rng: np.random.Generator) -> Try:
     for k, one in enumerate(motions):
         true = simulate(plant_base, plant, teeth, effects, one, sensing.rate)
         true["motor_torque"] = gain * true["motor_torque"]
-        records.append(sensing.measure(f"run {k + 1}", true, rng))
+        record = sensing.measure(f"run {k + 1}", true, rng)
+        if gapped and (k >= len(given) or not held):
+            left = followed(plant_base, plant, teeth, effects, one, sensing.rate, record)
+            record = replace(record, followed=left)
+        records.append(record)
     what = "+".join([*(["gap"] if gapped else []), *effects, *names]) or "nothing"
     right = [
         *([GAP] if gapped else []),

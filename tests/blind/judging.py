@@ -166,8 +166,10 @@ def closed(
     """Share of the held-out gap that was closed, of what noise leaves to close.
 
     Of the channel whose gap over its best possible is largest. The best possible is what the held-out log
-    differs from ideal sensors in the plant; where that isn't known, the channel's noise, or, of a recording
-    into which something was put, what its diagnosis leaves of the recording as it is: the machine's own.
+    differs from ideal sensors in the plant, or what the plant itself leaves when its motor is moved as the
+    log tells (what rattles in its play is in no log), where that is more; where neither is known, the
+    channel's noise, or, of a recording into which something was put, what its diagnosis leaves of the
+    recording as it is: the machine's own.
     ``None`` where less than a tenth of the gap is more than that.
 
     Args:
@@ -180,6 +182,7 @@ def closed(
     best: tuple[float, float] | None = None
     for channel, own in gap.items():
         floor = _floor(case, channel, readings) or own["noise"]
+        floor = max(floor, _followed(case, channel))
         if without and channel in without:
             floor = max(floor, without[channel]["after"])
         if not floor or own[since] < CLOSABLE * floor:
@@ -200,6 +203,12 @@ def _floor(case: Case, channel: str, readings: int) -> float | None:
         if channel in record.ideal and channel in record.channels
     ]
     return float(np.sqrt(np.mean(squares))) if squares else None
+
+
+def _followed(case: Case, channel: str) -> float:
+    """What the plant leaves of a channel of the held-out log, 0 where nobody has asked."""
+    left = [record.followed.get(channel, 0.0) for record in (case.holdout or case.records)]
+    return float(np.sqrt(np.mean(np.square(left))))
 
 
 def covered(case: Case, verdict: dict[str, Any]) -> list[list[Any]]:

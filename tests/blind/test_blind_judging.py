@@ -1,6 +1,7 @@
 """Judging, storing and the page, on lines that are written by hand."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,7 +144,10 @@ def test_what_can_be_closed_and_numbers_that_hold():
     assert closed(case, gap) == pytest.approx(0.9, abs=0.01)
     assert closed(case, gap, since="before") == pytest.approx(0.95, abs=0.01)
     assert closed(case, {"motor_torque": {"refit": 2.1, "after": 3.0, "noise": 9.0}}) is None
-    # What the machine itself leaves is nobody's to close.
+    # What the plant itself leaves along the log's motion is nobody's to close: nine of nine.
+    rattling = replace(case, records=(replace(measured, followed={"motor_torque": 3.0}),))
+    assert closed(rattling, gap) == 1.0
+    # What the machine itself leaves is nobody's either.
     own = {"motor_torque": {"after": 2.9, "noise": 1.0}}
     assert closed(case, gap, without=own) == pytest.approx((12.0 - 3.0) / (12.0 - 2.9), abs=1e-3)
 

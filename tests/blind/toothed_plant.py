@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from drawing import Drive, Sensing, log_uniform, started
+from contract import Measured
+from drawing import SKIP_S, Drive, Sensing, log_uniform, started
 from moving import motion
 
 import hdsim
 from hdsim.contact.law import ValidityWarning
 from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.drive.presets import PRINTED_FLANKS
+from hdsim.estimate.spline import spline_through
 from hdsim.scenario.writer import to_yaml
 
 #: Time for which the drive stands before its log begins, s.
@@ -159,6 +161,35 @@ def simulate(
     found["temperature"] = np.full(len(found["motor_angle"]), 22.0)
     found["standing"] = np.asarray(run["motor_angle"])[:: sampled // LIKE_HZ]
     return found
+
+
+def followed(
+    base: str, d: Drive, teeth: Teeth | None, effects: Effects, given: Told, rate: int, record: Measured
+) -> dict[str, float]:
+    """What the plant leaves of a record when its motor is moved as the readings tell, root mean square.
+
+    A load that rattles in a play is where its last bounce has left it: the motor's motion does not tell.
+
+    Args:
+        base: as for ``simulate``.
+        d: its numbers.
+        teeth: the mesh.
+        effects: settings of the effects, by name.
+        given: what the plant was told.
+        rate: of the samples, Hz.
+        record: what was measured then.
+    """
+    spline, _ = spline_through(record.time, record.channels["motor_angle"], motion=True)
+    ticks = np.arange(-STANDING_S, record.time[-1], 1.0 / LIKE_HZ)
+    like = spline(np.clip(ticks, record.time[0], record.time[-1]))
+    found = simulate(base, d, teeth, effects, given, rate, like)
+    count = round((record.time[-1] - SKIP_S) * rate)
+    rows = slice(round(SKIP_S * rate), count)
+    return {
+        channel: float(np.std((record.channels[channel] - found[channel][: len(record.time)])[rows]))
+        for channel in ("motor_torque", "output_angle", "output_torque")
+        if channel in record.channels
+    }
 
 
 def _table(path: Path, rate: int, columns: dict[str, np.ndarray]) -> None:

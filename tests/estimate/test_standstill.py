@@ -1,0 +1,93 @@
+"""Friction of a drive that sticks: known as far as the speed is, and not at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hdsim
+from hdsim.diagnosis.workflow import diagnose
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.records import Record
+from hdsim.estimate.standstill import resolution, standing
+from hdsim.estimate.state import state_of
+
+NOISE = {"motor_angle": 8e-6, "motor_torque": 4e-3}
+BASE = """
+name: a chirp that begins slowly
+drive: {preset: csg-25-50, mesh: {model: lumped}}
+command:
+  motor:
+    type: position
+    at: output
+    trajectory: {type: chirp, amplitude_deg: 4.4, start_frequency_hz: 0.03, end_frequency_hz: 1.4,
+                 duration_s: 12}
+    controller: {type: cascade, position_gain_per_s: 30, velocity_gain_nm_s_per_rad: 0.044,
+                 velocity_integral_gain_nm_per_rad: 0.9}
+load: {inertia_kg_m2: 0.875, gravity: {mass_kg: 7.0, centre_of_mass_m: 0.3}}
+run: {duration_s: 12, sample_rate_hz: 500}
+"""
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory):
+    path = tmp_path_factory.mktemp("sticks") / "base.yaml"
+    path.write_text(BASE, encoding="utf-8")
+    return hdsim.load_scenario(path)
+
+
+@pytest.fixture(scope="module")
+def record(base):
+    run, rng = hdsim.simulate(base), np.random.default_rng(2)
+    return Record(
+        "r", run.time, {c: run[c] + s * rng.standard_normal(len(run.time)) for c, s in NOISE.items()}
+    )
+
+
+def test_a_sticking_drive_is_predicted_to_its_noise_while_it_turns(base, record):
+    bench = bench_for([record], [], base)
+    (series,), (rest,) = bench.series, bench.residuals(bench.predict(state_of(base)))
+    counted = series.train | series.hold
+    assert counted.mean() > 0.8
+    assert np.std(rest[counted]) < 1.1 * series.noise
+    assert np.std(rest) > 2.0 * series.noise  # at rest the torque is what holds it
+
+
+@pytest.mark.slow
+def test_where_nothing_is_hidden_sticking_is_no_effect(base, record):
+    assert diagnose([record], base).verdict.verdict == "nothing"
+
+
+def test_a_chosen_smoothing_speed_creeps_and_counts_at_rest(base, record):
+    friction = base.drive.friction.model_copy(update={"smoothing_velocity_rad_per_s": 0.5})
+    creeps = base.model_copy(update={"drive": base.drive.model_copy(update={"friction": friction})})
+    (series,) = bench_for([record], [], creeps).series
+    assert (series.train | series.hold)[record.time > 0.05].all()
+
+
+def test_a_sign_is_smoothed_as_errors_of_the_speed_do():
+    rng = np.random.default_rng(0)
+    spread, speeds = 0.02, np.linspace(-0.05, 0.05, 5)
+    errors = spread * rng.standard_normal((20000, 1))
+    still = np.zeros(20000)
+    smoothing = resolution(still, still + errors[:, 0])
+    mean = np.sign(speeds + errors).mean(axis=0)
+    assert np.tanh(speeds / smoothing) == pytest.approx(mean, abs=0.07)
+
+
+def test_a_speed_is_known_no_better_than_between_samples_and_no_coarser_than_the_effects():
+    ramp = np.linspace(-1.0, 1.0, 201)
+    assert resolution(ramp, ramp) == pytest.approx(0.01 * np.sqrt(np.pi / 2))
+    assert resolution(ramp, ramp + 7.0) == 0.5
+
+
+def test_rests_and_reversals_take_their_neighbours_along():
+    time = np.arange(100) * 0.01
+    speed = np.where(time < 0.305, 1.0, np.where(time < 0.505, 0.0, -1.0))
+    speed[80:] = 1.0  # turns round between two samples
+    found = standing(speed, 0.01)
+    assert found[27:55].all()
+    assert found[75:85].all()
+    assert not found[:26].any()
+    assert not found[56:74].any()
+    assert not found[86:].any()
