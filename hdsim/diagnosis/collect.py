@@ -17,7 +17,7 @@ from hdsim.diagnosis.evidence import (
 )
 from hdsim.diagnosis.locate import SHARP, Location
 from hdsim.diagnosis.name import Named
-from hdsim.diagnosis.search import Search, Stage
+from hdsim.diagnosis.search import Search, Stage, shown_in
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.flanks import only_flanks
@@ -52,13 +52,15 @@ def collect(
     explained = bench.power(base.fit.predictions) - bench.power(found.fit.predictions)
     left = last.structured * found.left.power
     flanks = only_flanks(bench, left, found.left.project)
+    shown = shown_in(bench, found.fit)
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
         laws=[
             _law(
                 one,
                 found.fit.state.added[k],
-                found.stages,
+                shown[k] or catalogue()[one.name].signature.channels,
+                last,
                 explained if len(found.named) == 1 else one.worth,
                 _own_held(bench, found.fit.state, k, predictions["after"]),
             )
@@ -113,9 +115,14 @@ def _held(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> HeldOutEv
 
 
 def _law(
-    one: Named, added: Added, stages: Sequence[Stage], worth: float, held: HeldOutEvidence | None
+    one: Named,
+    added: Added,
+    channels: Sequence[str],
+    last: Location,
+    worth: float,
+    held: HeldOutEvidence | None,
 ) -> LawEvidence:
-    own = max(_own(added, stages[-1].location), 0.0)
+    own = max(_own(added, channels, last), 0.0)
     return LawEvidence(
         name=one.name,
         group=list(one.group),
@@ -125,7 +132,7 @@ def _law(
         # Sharp lines are no part of what smooth effects have left.
         needed=max(one.needed, one.of_lines) if added.lives_in[0] == SHARP else one.needed,
         own_left=own / max(own + max(worth, 0.0), 1e-300),
-        own_first=_own_first(added, stages[-1].location),
+        own_first=_own_first(added, channels, last),
         exact=catalogue()[one.name].signature.exact,
         at_limit=added.at_limit,
         sharp=added.lives_in[0] == SHARP,
@@ -133,20 +140,18 @@ def _law(
     )
 
 
-def _own_first(added: Added, location: Location) -> bool:
-    """Whether an effect's own coordinate holds more than any other of what is left in its channels."""
-    channels = catalogue()[added.effect].signature.channels
+def _own_first(added: Added, channels: Sequence[str], location: Location) -> bool:
+    """Whether an effect's own coordinate holds more than any other of what is left where it shows."""
     places = [place for place in location.places if place.channel in channels]
     best = max(places, key=lambda place: place.share * location.powers[place.channel], default=None)
     return best is None or best.coordinate == added.lives_in[0]
 
 
-def _own(added: Added, location: Location) -> float:
-    """Whitened power of a residual that lives in an effect's own coordinate, in its channels."""
-    signature = catalogue()[added.effect].signature
+def _own(added: Added, channels: Sequence[str], location: Location) -> float:
+    """Whitened power of a residual that lives in an effect's own coordinate, in channels it shows in."""
     found: dict[str, float] = {}
     for place in location.places:
-        if place.coordinate == added.lives_in[0] and place.channel in signature.channels:
+        if place.coordinate == added.lives_in[0] and place.channel in channels:
             power = place.share * location.powers[place.channel]
             found[place.channel] = max(found.get(place.channel, 0.0), power)
     return sum(found.values())

@@ -1,10 +1,12 @@
 """The family of real machines: recordings of joints into which an effect is put.
 
 What an effect would have changed along the measured motion follows from statics and kinematics, and, where
-the drive yields, from one linear equation: J d'' + c d' + k d = k e - T for the output's deviation d under a
-kinematic error e and a torque T on the output; the drive then carries k (e - d) more. A real joint has
-effects of its own that nobody knows all of. So an effect counts as found when it is named with its order and
-about its size, and the same recording without it does not get that name: every case brings that one along.
+the drive yields, from one linear equation: J d'' = F - T for the output's deviation d under a kinematic error
+e and a torque T on the output, where the drive carries F = k (e - d) + c (e' - d') more. No power is lost in
+an error: of the motor's torque the drive's whole one takes the part 1/i + de/dq, by the motor's angle q. A
+real joint has effects of its own that nobody knows all of. So an effect counts as found when it is named with
+its order and about its size, and the same recording without it does not get that name: every case brings that
+one along.
 """
 
 from __future__ import annotations
@@ -15,7 +17,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from contract import Case, Kind, Measured
-from real_records import KINOVA_FRICTION, Joint, kinova, lara, noise_of, rates
+from real_records import (
+    KINOVA_FRICTION,
+    SIGN_SPEED,
+    Joint,
+    absorbed,
+    beyond,
+    carried,
+    kinova,
+    lara,
+    motor_angle,
+    over_noise,
+    rates,
+    remains,
+)
 from scipy.signal import cont2discrete, dlsim
 
 FAMILY = "real"
@@ -24,8 +39,8 @@ STRENGTH, LEAST = (1.0, 60.0), 0.7
 ARCMIN = np.pi / 10800
 #: Damping of the output on the drive's spring, share of critical.
 DAMPING = 0.05
-#: Speed over which friction's sign is smoothed, rad/s of the motor (as the base's).
-SIGN_SPEED = 0.5
+#: Steps of the drive's equation in a sample.
+FINER = 8
 
 Changed = dict[str, np.ndarray]
 Change = Callable[[Joint, Measured, float, np.random.Generator], Changed]
@@ -38,7 +53,7 @@ class PutIn:
     Attributes:
         name: in the words of a key.
         truth: names of the catalogue that are right; none: nothing new is right.
-        change: what it adds to channels of a record at size 1.
+        change: what it adds to channels of a record at a size.
         most: largest size, in ``unit``.
         unit: of the size.
         where: names of joints begin with it.
@@ -60,27 +75,46 @@ class PutIn:
     but_not: tuple[str, ...] = ()
 
 
-def motor_angle(joint: Joint, record: Measured) -> np.ndarray:
-    """As measured, or that of the output behind the gear."""
-    measured = record.channels.get("motor_angle")
-    return measured if measured is not None else joint.ratio * record.channels["output_angle"]
+#: Of an angle of the motor: an error of the gear there, rad, and its derivative.
+Error = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def through(joint: Joint, record: Measured, error: np.ndarray, torque: np.ndarray) -> Changed:
-    """What a kinematic error (rad) and a torque that the load adds (N m) change, the motor's motion given."""
+def without_error(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A gear without kinematic error."""
+    return np.zeros_like(angle), np.zeros_like(angle)
+
+
+def through(joint: Joint, record: Measured, error: Error, torque: np.ndarray) -> Changed:
+    """What a kinematic error and a torque (N m) that the load adds change, the motor's motion given."""
     k, inertia = joint.stiffness, joint.inertia
     c = 2 * DAMPING * np.sqrt(k * inertia)
-    step = float(np.median(np.diff(record.time)))
+    # Finer than the samples, which are a few in a period of a high order.
+    step = float(np.median(np.diff(record.time))) / FINER
     even = np.arange(0.0, record.time[-1] + step, step)
-    push = np.interp(even, record.time, k * error - torque)
+    angle, speed, added = (
+        np.interp(even, record.time, values)
+        for values in (
+            motor_angle(joint, record), rates(record.time, motor_angle(joint, record))[0], torque
+        )
+    )  # fmt: skip
+    e, slope = error(angle)
+    drives = k * e + c * slope * speed
     system = cont2discrete(
         (np.array([[0.0, 1.0], [-k / inertia, -c / inertia]]), np.array([[0.0], [1.0 / inertia]]),
          np.eye(2), np.zeros((2, 1))), step, method="foh",
     )  # fmt: skip
+    push = drives - added
     # It begins where the drive would be at rest.
     _, _, state = dlsim(system, push[:, None], x0=np.array([push[0] / k, 0.0]))
-    moved = np.interp(record.time, even, state[:, 0])
-    return {"output_angle": moved, "motor_torque": k * (error - moved) / joint.ratio}
+    moved, more = (
+        np.interp(record.time, even, values)
+        for values in (state[:, 0], drives - k * state[:, 0] - c * state[:, 1])
+    )
+    slopes = error(motor_angle(joint, record))[1]
+    return {
+        "output_angle": moved,
+        "motor_torque": more / joint.ratio + (carried(joint, record) + more) * slopes,
+    }
 
 
 def ripple(order: float) -> Change:
@@ -104,7 +138,7 @@ def weight(joint: Joint, record: Measured, size: float, rng: np.random.Generator
     """A weight on the output at an angle of its own."""
     torque = size * np.cos(record.channels["output_angle"] + rng.uniform(0, 2 * np.pi))
     if joint.stiffness:
-        return through(joint, record, np.zeros_like(torque), torque)
+        return through(joint, record, without_error, torque)
     # A sensor on the output carries it, and so does the motor, behind the gear: the load is what it reads.
     return {"output_torque": torque, "motor_torque": torque / joint.ratio}
 
@@ -113,8 +147,13 @@ def kinematic(order: float) -> Change:
     """Kinematic error of the gear, by the motor's angle."""
 
     def change(joint: Joint, record: Measured, size: float, rng: np.random.Generator) -> Changed:
-        error = size * np.sin(order * motor_angle(joint, record) + rng.uniform(0, 2 * np.pi))
-        return through(joint, record, error, np.zeros_like(error))
+        phase = rng.uniform(0, 2 * np.pi)
+
+        def error(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            turned = order * angle + phase
+            return size * np.sin(turned), size * order * np.cos(turned)
+
+        return through(joint, record, error, np.zeros_like(record.time))
 
     return change
 
@@ -176,7 +215,8 @@ def draw(number: int, seed: int) -> Case:
     while size * one < LEAST:
         # What cannot be seen at a physical size is drawn again.
         effect, phase = choice[rng.integers(len(choice))], int(rng.integers(2**31))
-        one = visible(joint, effect, phase)
+        # An error of the gear is not quite in proportion: it is looked at where it is physical.
+        one = visible(joint, effect, effect.most(joint), phase) / effect.most(joint)
         size = min(float(np.exp(rng.uniform(*np.log(STRENGTH)))) / one, effect.most(joint))
         if not effect.truth:
             size = effect.most(joint)
@@ -205,7 +245,7 @@ def draw(number: int, seed: int) -> Case:
         truth=(effect.truth,) if effect.truth else (),
         records=tuple(with_it(joint, effect, r, size, phase) for r in learnt),
         holdout=tuple(with_it(joint, effect, r, size, phase) for r in held),
-        strength=(size * one,) if effect.truth else (),
+        strength=(visible(joint, effect, size, phase),) if effect.truth else (),
         without=plain,
     )
 
@@ -216,25 +256,16 @@ def with_it(joint: Joint, effect: PutIn, record: Measured, size: float, phase: i
     return replace(record, channels=record.channels | {c: record.channels[c] + v for c, v in added.items()})
 
 
-def visible(joint: Joint, effect: PutIn, phase: int) -> float:
-    """Strength at size 1: what is left of the trace beyond the base's numbers, over the noise."""
+def visible(joint: Joint, effect: PutIn, size: float, phase: int) -> float:
+    """Strength: the trace beyond the base's numbers over what is known to be left of the recording.
+
+    That is the noise of the other families, where the true model leaves nothing else.
+    """
     record = joint.records[0]
-    added = effect.change(joint, record, 1.0, np.random.default_rng(phase))
-    output = record.channels["output_angle"]
-    speed, acceleration = rates(record.time, output)
-    friction = [np.tanh(joint.ratio * speed / SIGN_SPEED), speed]
-    # The load's torque is what a sensor reads, or that of the arm.
-    load = record.channels.get("output_torque", np.sin(output - joint.hanging))
-    own = [np.ones_like(output), acceleration, load, *friction]
-    columns = np.column_stack(own)
-    sizes = []
-    for channel, trace in added.items():
-        if channel == "output_torque":
-            continue
-        # An angle's noise is that of the transmission error: what jitters with the clock is in both.
-        measured = record.channels[channel]
-        if channel == "output_angle":
-            measured = measured - record.channels["motor_angle"] / joint.ratio
-        rest = trace - columns @ np.linalg.lstsq(columns, trace, rcond=None)[0]
-        sizes.append(float(np.std(rest)) / noise_of(measured))
-    return max(sizes)
+    added = effect.change(joint, record, size, np.random.default_rng(phase))
+    # The load is what a sensor of the torque reads.
+    return max(
+        over_noise(record.time, beyond(trace, absorbed(joint, record)), remains(joint, record, channel))
+        for channel, trace in added.items()
+        if channel != "output_torque"
+    )

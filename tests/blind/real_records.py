@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from contract import AbsentError, Measured
+from scipy.signal import savgol_filter, welch
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 KINOVA = "kinova-gen3-7dof/validation_data/opti_traj_testing{}.csv"
@@ -20,8 +21,13 @@ LARA = "lara8-joint3-dual-encoder/joint3.csv"
 
 #: Output Coulomb (N m) and viscous (N m s/rad) friction of the Kinova joints, as read off in SOURCE.md.
 KINOVA_FRICTION = {1: (2.66, 3.02), 3: (2.17, 2.40), 4: (2.44, 2.54), 6: (1.18, 0.90), 7: (1.14, 0.85)}
+#: Orders of the motor's turn that SOURCE.md names: of the current, and of the torque sensor that is the load.
+KINOVA_ORDERS, LARA_ORDERS = (2.0, 7.0, 12.0, 14.0), (1.98, 2.0)
 #: N m at the output per ampere (SOURCE.md).
 KINOVA_CONSTANT = {1: 9.130, 3: 9.130, 4: 9.130, 6: 5.852, 7: 5.852}
+
+#: Speed over which friction's sign is smoothed, rad/s of the motor (as the base's).
+SIGN_SPEED = 0.5
 
 
 @dataclass(frozen=True)
@@ -35,10 +41,12 @@ class Joint:
         base: the plain model as YAML: ratio, friction, stiffness and load, no effect.
         coulomb: friction at the motor, N m.
         stiffness: of the drive at the output, N m/rad; 0: rigid.
-        inertia: of the load, kg m^2; ``hanging`` the angle at which its arm hangs.
+        inertia: of the load, kg m^2; ``hanging`` the angle at which its arm hangs, ``weight`` that times its
+            lever, N m.
         load: where the load's torque comes from.
         records: recordings.
-        own: effects of the catalogue that SOURCE.md of the recordings says it has.
+        own: effects of the catalogue that SOURCE.md of the recordings says it has; ``orders`` of the motor's
+            turn that it names.
     """
 
     name: str
@@ -51,7 +59,9 @@ class Joint:
     load: str | None
     records: tuple[Measured, ...]
     hanging: float = 0.0
+    weight: float = 0.0
     own: tuple[str, ...] = ()
+    orders: tuple[float, ...] = ()
 
 
 def _table(name: str) -> np.ndarray:
@@ -113,6 +123,7 @@ def kinova(joint: int) -> Joint:
     return Joint(
         f"kinova {joint}", ratio, "torque sensor", text, coulomb / ratio, 0.0, 0.0, "output_torque",
         tuple(records), own=("sensors", *(["motor_torque_ripple"] if joint > 5 else [])),
+        orders=KINOVA_ORDERS,
     )  # fmt: skip
 
 
@@ -146,7 +157,7 @@ def lara() -> Joint:
         inertia=inertia, gravity=gravity,
     )  # fmt: skip
     return Joint("lara 3", ratio, "both", text, coulomb, stiffness, inertia, None, (record,), hanging,
-                 ("kinematic_error",))  # fmt: skip
+                 weight, ("kinematic_error",), LARA_ORDERS)  # fmt: skip
 
 
 def _arm(record: Measured, ratio: float) -> tuple[float, float, float]:
@@ -156,7 +167,7 @@ def _arm(record: Measured, ratio: float) -> tuple[float, float, float]:
     """
     output = record.channels["output_angle"]
     velocity, acceleration = rates(record.time, output)
-    friction = [np.ones_like(output), np.tanh(ratio * velocity / 0.5), velocity]
+    friction = [np.ones_like(output), np.tanh(ratio * velocity / SIGN_SPEED), velocity]
     columns = np.column_stack([np.cos(output), np.sin(output), acceleration, *friction])
     c, s, a = np.linalg.lstsq(columns, ratio * record.channels["motor_torque"], rcond=None)[0][:3]
     # The torque is w sin(q - h) + J q'' = w cos(h) sin(q) - w sin(h) cos(q) + J q'' and friction.
@@ -165,8 +176,6 @@ def _arm(record: Measured, ratio: float) -> tuple[float, float, float]:
 
 def rates(time: np.ndarray, angle: np.ndarray, over_s: float = 0.15) -> tuple[np.ndarray, np.ndarray]:
     """Speed and acceleration of a measured angle, cubic over a moving window; shape (n,) each."""
-    from scipy.signal import savgol_filter
-
     step = float(np.median(np.diff(time)))
     even = np.arange(0.0, time[-1] - time[0] + step, step)
     width = max(5, 2 * round(over_s / step / 2) + 1)
@@ -176,6 +185,64 @@ def rates(time: np.ndarray, angle: np.ndarray, over_s: float = 0.15) -> tuple[np
     )
 
 
-def noise_of(values: np.ndarray) -> float:
-    """Standard deviation of white noise, from the median of fourth differences (whose variance is 70)."""
-    return float(np.median(np.abs(np.diff(values, 4))) / 0.6745 / np.sqrt(70.0))
+def motor_angle(joint: Joint, record: Measured) -> np.ndarray:
+    """As measured, or that of the output behind the gear."""
+    measured = record.channels.get("motor_angle")
+    return measured if measured is not None else joint.ratio * record.channels["output_angle"]
+
+
+def carried(joint: Joint, record: Measured) -> np.ndarray:
+    """Torque that the drive carries as recorded, N m: what the load's weight and inertia ask for."""
+    output = record.channels["output_angle"]
+    return joint.weight * np.sin(output - joint.hanging) + joint.inertia * rates(record.time, output)[1]
+
+
+def reading(joint: Joint, record: Measured, channel: str) -> np.ndarray:
+    """A channel; of the output's angle the transmission error: what jitters with the clock is in both."""
+    values = record.channels[channel]
+    return values - record.channels["motor_angle"] / joint.ratio if channel == "output_angle" else values
+
+
+def absorbed(joint: Joint, record: Measured) -> np.ndarray:
+    """Columns (n, k) of what the base's numbers can say: zero, inertia, load, friction."""
+    output = record.channels["output_angle"]
+    speed, acceleration = rates(record.time, output)
+    # The load's torque is what a sensor reads, or that of the arm.
+    load = record.channels.get("output_torque", np.sin(output - joint.hanging))
+    friction = np.tanh(joint.ratio * speed / SIGN_SPEED)
+    return np.column_stack([np.ones_like(output), acceleration, load, friction, speed])
+
+
+def remains(joint: Joint, record: Measured, channel: str) -> np.ndarray:
+    """What the best known description leaves of a channel: the sensor's noise and what is the machine's own.
+
+    Beside the base's numbers it has a weight at any angle, an error of the output's turn at orders 1 and 2,
+    and the orders of the motor's turn that are known of the joint.
+    """
+    output, motor = record.channels["output_angle"], motor_angle(joint, record)
+    turning = [output, 2 * output, *(order * motor for order in joint.orders)]
+    known = np.column_stack([absorbed(joint, record), *(f(a) for a in turning for f in (np.sin, np.cos))])
+    return beyond(reading(joint, record, channel), known)
+
+
+def beyond(values: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """What least squares leave of values."""
+    # Columns of any unit: a speed beside a sine.
+    columns = columns / np.linalg.norm(columns, axis=0)
+    return values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+
+
+def over_noise(time: np.ndarray, trace: np.ndarray, noise: np.ndarray) -> float:
+    """Root mean square of a trace over noise of any colour: of both behind the filter that whitens the noise.
+
+    With white noise it is the ratio of their root mean squares, with any other that of white noise in which a
+    known trace is as visible (matched filter).
+    """
+    step = float(np.median(np.diff(time)))
+    even = np.arange(time[0], time[-1] + step / 2, step)
+    trace, noise = (np.interp(even, time, values) for values in (trace, noise))
+    # Welch's estimate of both, in eleven windows: a narrow line leaks as much of either.
+    of_trace, of_noise = (
+        welch(values, nperseg=len(even) // 6, detrend=False)[1] for values in (trace, noise)
+    )
+    return float(np.sqrt(np.mean(of_trace / of_noise)))

@@ -1,10 +1,13 @@
 """Effects that are put into recordings of real joints, against closed forms."""
 
+from dataclasses import replace
+
 import family_real as family
 import numpy as np
 import pytest
 from contract import AbsentError, Measured
-from real_records import Joint, lara, noise_of, rates
+from real_records import Joint, lara, over_noise, rates, remains
+from scipy.ndimage import gaussian_filter1d
 
 try:
     family.joints()
@@ -22,20 +25,35 @@ def joint(stiffness=2.0e4, inertia=5.0, hz=1000.0, speed=3.0):
     return Joint("made 1", 100.0, "both", "", 0.05, stiffness, inertia, None, (record,)), record
 
 
+def turned(angle):
+    return 1e-4 * np.sin(2 * angle), 2e-4 * np.cos(2 * angle)
+
+
 @pytest.mark.parametrize("speed", [3.0, 100.0])
-def test_a_kinematic_error_moves_the_output_as_an_oscillator_answers(speed):
-    """Amplitude over that of the error: k / |k - J w^2 + i c w|; the motor carries k (e - d) / i."""
+def test_a_kinematic_error_moves_the_output_as_an_oscillator_answers_at_its_foot(speed):
+    """Amplitude over that of the error: |k + i c w| / |k - J w^2 + i c w|; the motor carries J d'' / i."""
     made, record = joint(speed=speed)
-    error = 1e-4 * np.sin(2 * record.channels["motor_angle"])
-    found = family.through(made, record, error, np.zeros_like(error))
+    found = family.through(made, record, turned, np.zeros_like(record.time))
     k, inertia, w = made.stiffness, made.inertia, 2 * speed
     c = 2 * family.DAMPING * np.sqrt(k * inertia)
-    answer = 1e-4 * k / abs(k - inertia * w**2 + 1j * c * w)
+    answer = 1e-4 * abs(k + 1j * c * w) / abs(k - inertia * w**2 + 1j * c * w)
     late = record.time > 3.0
     assert np.ptp(found["output_angle"][late]) / 2 == pytest.approx(answer, rel=0.03)
-    # What the motor carries more is what the output's inertia and damping take.
-    carried = abs(-inertia * w**2 + 1j * c * w) * answer / made.ratio
-    assert np.ptp(found["motor_torque"][late]) / 2 == pytest.approx(carried, rel=0.05)
+    torque = inertia * w**2 * answer / made.ratio
+    assert np.ptp(found["motor_torque"][late]) / 2 == pytest.approx(torque, rel=0.05)
+
+
+def test_no_power_is_lost_in_a_kinematic_error():
+    """Of a weight that hangs on the drive the motor lifts what the error lifts (virtual work)."""
+    made, record = joint(inertia=0.1, speed=20.0)
+    made = replace(made, weight=60.0)
+    found = family.through(made, record, turned, np.zeros_like(record.time))
+    late = record.time > 2.0
+    motor, output = (record.channels[c][late] for c in ("motor_angle", "output_angle"))
+    lifted = 60.0 * np.sin(output) * turned(motor)[1]
+    assert np.std(found["motor_torque"][late] - lifted) < 0.03 * np.std(lifted)
+    # Without it the motor would carry what the load's inertia asks for and nothing else.
+    assert np.std(lifted) > 20 * 0.1 * 40.0**2 * 1e-4 / made.ratio
 
 
 def test_a_slow_weight_twists_the_drive_and_loads_the_motor_as_statics_say():
@@ -43,22 +61,45 @@ def test_a_slow_weight_twists_the_drive_and_loads_the_motor_as_statics_say():
     found = family.weight(made, record, 40.0, np.random.default_rng(3))
     late = record.time > 2.0
     twist = found["output_angle"][late]
-    assert np.ptp(found["motor_torque"][late] + made.stiffness * twist / made.ratio) < 1e-9
+    damped = 1e-3 * np.ptp(twist) * made.stiffness / made.ratio
+    assert np.ptp(found["motor_torque"][late] + made.stiffness * twist / made.ratio) < damped
     angle = record.channels["output_angle"][late]
     columns = np.column_stack([np.cos(angle), np.sin(angle)])
     fitted = np.linalg.lstsq(columns, -made.stiffness * twist, rcond=None)[0]
     assert np.hypot(*fitted) == pytest.approx(40.0, rel=0.01)
 
 
-def test_noise_and_rates_of_made_signals():
-    rng = np.random.default_rng(1)
+def test_rates_of_a_made_signal():
     time = np.arange(0.0, 5.0, 1e-3)
     angle = np.sin(2 * time)
-    assert noise_of(angle + rng.normal(0, 3e-4, len(time))) == pytest.approx(3e-4, rel=0.05)
     speed, acceleration = rates(time, angle)
     inside = slice(200, -200)
     assert np.abs(speed - 2 * np.cos(2 * time))[inside].max() < 0.01
     assert np.abs(acceleration + 4 * np.sin(2 * time))[inside].max() < 0.02
+
+
+def test_strength_is_the_ratio_of_root_mean_squares_in_white_noise_and_by_frequency_in_any_other():
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 10.0, 1e-3)
+    white = rng.normal(0, 3e-4, len(time))
+    line = 1e-3 * np.sin(2 * np.pi * 80.0 * time)
+    assert over_noise(time, line, white) == pytest.approx(1e-3 / np.sqrt(2) / 3e-4, rel=0.1)
+    # A machine's own motion of ten times the size hides what is as slow as itself, and not what is not.
+    slow = gaussian_filter1d(rng.normal(0, 6e-2, len(time)), 50)
+    assert over_noise(time, line, white + slow) == pytest.approx(over_noise(time, line, white), rel=0.3)
+    drift = 1e-3 * np.sin(2 * np.pi * 1.0 * time)
+    assert over_noise(time, drift, white + slow) < 0.1 * over_noise(time, drift, white)
+
+
+def test_what_is_known_of_a_joint_is_no_noise_and_what_it_does_beyond_that_is():
+    made, record = joint(speed=20.0)
+    rng = np.random.default_rng(2)
+    motor, noise = record.channels["motor_angle"], rng.normal(0, 1e-3, len(record.time))
+    own = 0.3 + 0.02 * np.sin(2.0 * motor + 1.0)
+    for known, left in (((2.0,), noise), ((), noise + own - 0.3)):
+        described = replace(made, orders=known)
+        read = replace(record, channels=record.channels | {"motor_torque": own + noise})
+        assert np.std(remains(described, read, "motor_torque")) == pytest.approx(np.std(left), rel=0.02)
 
 
 @recordings
