@@ -262,9 +262,9 @@ class Model(Contributed):
         )
 
     def seen_scale(self, closer: float = 1.0) -> Array:
-        """Sizes at which errors of the states matter where a torque's sensor is slower than a step, (states,).
+        """Sizes at which errors of the states matter beside a sensor's noise, shape (states,).
 
-        There a ring's speed counts by what it does to its own twist alone, not by its dampers' torque.
+        A ring's speed counts by what it does to its own twist alone, not by its dampers' torque too.
 
         Args:
             closer: part of that speed that counts, as its inverse.
