@@ -262,21 +262,23 @@ class Model(Contributed):
         )
 
     def seen_scale(self, closer: float = 1.0) -> Array:
-        """Sizes at which errors of the states matter where nobody looks at the ring itself, shape (states,).
+        """Sizes at which errors of the states matter beside a sensor's noise, shape (states,).
 
-        A ring's speed counts by what it does to its own twist: at that twist's size, it is the speed of its
-        own mode, sqrt(K3 / ring's inertia), some hundred times that of the load's mode. Held to the load's,
-        it sets the step: teeth that touch and part stir the ring's speed, but no twist and no torque.
+        A ring's speed counts by what it does to its own twist alone, not by its dampers' torque too.
 
         Args:
             closer: part of that speed that counts, as its inverse.
         """
         found = self.system.scale.copy()
         if "ring" in self.place_of:
-            at, torsion = self.place_of["ring"], self.drive.torsion
-            own = float(np.sqrt(torsion.stiffness_k3_nm_per_rad / self.drive.inertia.ring_kg_m2))
-            found[at + 1] = max(found[at + 1], found[at] * own / closer)
+            at = self.place_of["ring"]
+            found[at + 1] = max(found[at + 1], self._own_speed(found[at]) / closer)
         return found
+
+    def _own_speed(self, twist_rad: float) -> float:
+        """Speed (rad/s) of the ring's own mode between motor and output at an amplitude."""
+        torsion = self.drive.torsion
+        return twist_rad * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / self.drive.inertia.ring_kg_m2))
 
     def _is_free(self, name: str) -> bool:
         if name in self.motions:
@@ -296,6 +298,14 @@ class Model(Contributed):
             scale[at] = angle
             # Velocity of the slow torsional mode at that amplitude.
             scale[at + 1] = angle * float(np.sqrt(torsion.stiffness_k3_nm_per_rad / max(output, 1e-3)))
+        if "ring" in self.place_of:
+            # What it does to its own twist and to the torque of its dampers. Held to the load's speed, a
+            # hundredth of that, it would set the step: teeth that touch and part stir it, and nothing else.
+            at, mesh = self.place_of["ring"], self.drive.mesh
+            assert isinstance(mesh, TeethMesh | TabulatedMesh)
+            damping = self.drive.torsion.damping_nm_s_per_rad + mesh.damping_nm_s_per_rad
+            damped = self.rated_torque_nm / damping if damping > 0 else np.inf
+            scale[at + 1] = max(scale[at + 1], min(self._own_speed(wind_up), damped))
         if "motor" in self.place_of:
             # A sign of the speed over w_s: a stuck shaft that is off by w_s is no longer stuck.
             at = self.place_of["motor"] + 1

@@ -71,9 +71,10 @@ def channels(run: Any, y: Any, longer: float = 1.0) -> Any:
 
 
 def worst(found: Any, wanted: Any) -> float:
-    """Largest relative root-mean-square difference over the channels."""
+    """Largest root-mean-square difference over the channels, relative to their size over the whole run."""
+    size = (wanted**2).mean(axis=1)
     wanted = wanted[:, : found.shape[1]]
-    return float(np.sqrt(((found - wanted) ** 2).mean(axis=1) / (wanted**2).mean(axis=1)).max())
+    return float(np.sqrt(((found - wanted) ** 2).mean(axis=1) / size).max())
 
 
 def solution(run: Any, rtol: float, longer: float = 1.0) -> Any:
@@ -96,14 +97,30 @@ def reference(drive: Any) -> Any:
 def test_every_method_agrees_with_a_tight_reference(method: str, drive: Any, reference: Any) -> None:
     explicit = method in ("RK45", "DOP853")
     times = TIMES[:13] if explicit else TIMES
-    # Measured: 0.03 to 18 tolerances, LSODA 38. The tolerance is relative to each state's scale, the error to
-    # the channels of the run; the methods with memory lose accuracy where teeth touch and part.
+    # Measured: 0.6 to 10 tolerances, LSODA 139. The tolerance is relative to each state's scale, the error to
+    # the channels of the run; the methods with memory lose accuracy where teeth touch and part, the explicit
+    # ones let the damped ring chatter within the tolerance of its speed.
     factor = 200.0 if method == "LSODA" else 50.0
     rtol = 1e-6
     found = integrate(drive.model.system, 0.0, times[-1], drive.y0, method=method, rtol=rtol, t_eval=times)
     assert found.success, found.message
     error = worst(channels(drive, found.y), reference)
     assert error < factor * rtol
+
+
+def test_the_rings_speed_does_not_set_the_step(drive: Any, reference: Any) -> None:
+    """It is held to what it does to the ring's twist and to its damper's torque, not to the load's speed."""
+    system, places = drive.model.system, drive.model.place_of
+    held = system.scale.copy()
+    held[places["ring"] + 1] = held[places["output"] + 1]
+    found, dear = (
+        rodas4_through(system, TIMES[[0, -1]], drive.y0, TIMES, rtol=1e-6, atol=1e-6 * scale)
+        for scale in (system.scale, held)
+    )
+    assert found.statistics.nfev < dear.statistics.nfev / 3  # measured 4.7
+    twist, torque, tracking = np.abs(channels(drive, found.y) - reference).max(axis=1)
+    assert torque < 20e-6 * drive.model.rated_torque_nm  # measured 13 tolerances
+    assert max(twist, tracking) < 1e-6 * system.scale[places["ring"]]  # 0.3
 
 
 def test_two_families_of_methods_agree_far_below_any_tolerance_in_use(drive: Any, reference: Any) -> None:
