@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import PhysicsError
 from hdsim.estimate.knots import least_squares_spline
 from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
-from hdsim.estimate.records import FEWEST_SAMPLES, Array, Mask, Record
+from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, pieces_of, signal, smoothed, spline_through
-from hdsim.estimate.standstill import resolution, standing
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
@@ -64,18 +64,10 @@ class Predictor:
         ratio: the model's signed ratio.
         arm: what the drive's joint carries, where that is a robot arm; its numbers are each candidate's own.
         rtol: relative tolerance of the integration.
-        sticks: whether the drive sticks at rest, where the motion does not tell its friction.
     """
 
     def __init__(
-        self,
-        record: Record,
-        plan: Plan,
-        ratio: float,
-        arm: Arm | None = None,
-        rtol: float = RTOL,
-        *,
-        sticks: bool = False,
+        self, record: Record, plan: Plan, ratio: float, arm: Arm | None = None, rtol: float = RTOL
     ) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
         turns, self._zero = 0, 0.0
@@ -96,8 +88,7 @@ class Predictor:
         self._breaks, self._coefficients = breaks, coefficients
         self.turn(0.0)
         #: Motor speed over which a sticking drive's sign of friction is smoothed, rad/s.
-        self.smoothing = resolution(self.motor_velocity, self.disturbed().motor_velocity)
-        self._sticks = sticks
+        self.smoothing = RESOLVED_RAD_PER_S
         self.load_torque: SignalData | None = None
         if plan.load != "scenario":
             step = self._step(plan.load)
@@ -183,7 +174,6 @@ class Predictor:
         With both encoders the output's angle is read beside the motor's at the same moment: what a jittering
         clock, or the motor's encoder, puts on both falls out of their difference, the transmission error.
         Where that has less noise, the motor's reading less its smooth motion is taken out of the output's.
-        Of a drive that sticks, the motor's torque counts while it turns.
 
         Returns:
             Samples (n,), which of them count (n,), their noise, and that of a single reading.
@@ -197,10 +187,6 @@ class Predictor:
             return noise_of_means(read, good, step, means, whole, record.readings), single
 
         plain = noises(raw.channels[channel], raw.trusted[channel], step, values, trusted)
-        if channel == "motor_torque" and self._sticks:
-            turning = trusted & ~standing(self.motor_velocity, self.smoothing)
-            # Of a record that hardly turns, what it has is better than nothing.
-            trusted = turning if turning.sum() >= FEWEST_SAMPLES else trusted
         if channel != "output_angle" or self.plan.motion != "motor_angle":
             return values, trusted, *plain
         motor, turned = record.filled("motor_angle"), raw.filled("motor_angle")
@@ -297,7 +283,6 @@ def predictors(
     load: LoadSource | None = None,
     locked: Locked = "",
     arm: Arm | None = None,
-    sticks: bool = False,
 ) -> list[Predictor]:
     """One predictor for each record."""
-    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio, arm, sticks=sticks) for r in records]
+    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio, arm) for r in records]
