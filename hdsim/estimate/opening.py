@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
@@ -82,10 +82,9 @@ def bench_for(
         [thinned(record, over(record, span) if readings > 1 else 1) for record in many]
         for many in (records, held)
     )
-    drive, locked = scenario.drive, locked_side(scenario)
-    given: dict[str, Any] = {"arm": scenario.load.arm, "sticks": drive.friction.sticks}
+    ratio, locked = scenario.drive.ratio, locked_side(scenario)
     training, proving = (
-        predictors(many, drive.ratio, load=load, locked=locked, **given) for many in (records, held)
+        predictors(many, ratio, load=load, locked=locked, arm=scenario.load.arm) for many in (records, held)
     )
     bench = Bench(training, proving, zeros)
     take_short_cut(bench, state_of(scenario))

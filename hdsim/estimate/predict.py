@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import PhysicsError
 from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
-from hdsim.estimate.records import FEWEST_SAMPLES, Array, Mask, Record
+from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
-from hdsim.estimate.standstill import resolution, standing
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
@@ -63,18 +63,10 @@ class Predictor:
         ratio: the model's signed ratio.
         arm: what the drive's joint carries, where that is a robot arm; its numbers are each candidate's own.
         rtol: relative tolerance of the integration.
-        sticks: whether the drive sticks at rest, where the motion does not tell its friction.
     """
 
     def __init__(
-        self,
-        record: Record,
-        plan: Plan,
-        ratio: float,
-        arm: Arm | None = None,
-        rtol: float = RTOL,
-        *,
-        sticks: bool = False,
+        self, record: Record, plan: Plan, ratio: float, arm: Arm | None = None, rtol: float = RTOL
     ) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
         turns, self._zero = 0, 0.0
@@ -95,8 +87,7 @@ class Predictor:
         self._breaks, self._coefficients = breaks, coefficients
         self.turn(0.0)
         #: Motor speed over which a sticking drive's sign of friction is smoothed, rad/s.
-        self.smoothing = resolution(self.motor_velocity, self._moved().motor_velocity)
-        self._sticks = sticks
+        self.smoothing = RESOLVED_RAD_PER_S
         self.load_torque: SignalData | None = None
         if plan.load != "scenario":
             step = self._step(plan.load)
@@ -144,24 +135,22 @@ class Predictor:
         Args:
             seed: of the draw.
         """
-        found = self._moved(seed)
-        if self._arm is not None:
-            found.course = arm_course(self.record, self._arm, np.random.default_rng([seed, 12]))
-        return found
-
-    def _moved(self, seed: int = 0) -> Predictor:
-        """The same record with the prescribed motion alone drawn anew."""
         rng = np.random.default_rng([seed, 11])
-        if self._likeliest is not None:
-            coefficients: Array | None = pieces_of(self._likeliest.disturbed(rng))[1]
-        else:
-            smooth, step = self.motor_angle / self._factor, self._step(self.plan.motion)
-            coefficients = drawn_anew(self.record.time, self._reading, smooth, self._breaks, step, rng)
         found = copy(self)
+        coefficients = self._drawn(rng)
         if coefficients is not None:
             found._coefficients = self._factor * coefficients
             found.turn(0.0)
+        if self._arm is not None:
+            found.course = arm_course(self.record, self._arm, rng)
         return found
+
+    def _drawn(self, rng: np.random.Generator) -> Array | None:
+        """Coefficients (4, k) of the motion's reading drawn anew; None where it has no noise."""
+        if self._likeliest is not None:
+            return pieces_of(self._likeliest.disturbed(rng))[1]
+        smooth, step = self.motor_angle / self._factor, self._step(self.plan.motion)
+        return drawn_anew(self.record.time, self._reading, smooth, self._breaks, step, rng)
 
     def _step(self, channel: str) -> float:
         """Step of a channel's sensor, as it is felt in the record."""
@@ -176,7 +165,6 @@ class Predictor:
         With both encoders the output's angle is read beside the motor's at the same moment: what a jittering
         clock, or the motor's encoder, puts on both falls out of their difference, the transmission error.
         Where that has less noise, the motor's reading less its smooth motion is taken out of the output's.
-        Of a drive that sticks, the motor's torque counts while it turns.
 
         Returns:
             Samples (n,), which of them count (n,), their noise, and that of a single reading.
@@ -190,10 +178,6 @@ class Predictor:
             return noise_of_means(read, good, step, means, whole, record.readings), single
 
         plain = noises(raw.channels[channel], raw.trusted[channel], step, values, trusted)
-        if channel == "motor_torque" and self._sticks:
-            turning = trusted & ~standing(self.motor_velocity, self.smoothing)
-            # Of a record that hardly turns, what it has is better than nothing.
-            trusted = turning if turning.sum() >= FEWEST_SAMPLES else trusted
         if channel != "output_angle" or self.plan.motion != "motor_angle":
             return values, trusted, *plain
         motor, turned = record.filled("motor_angle"), raw.filled("motor_angle")
@@ -290,7 +274,6 @@ def predictors(
     load: LoadSource | None = None,
     locked: Locked = "",
     arm: Arm | None = None,
-    sticks: bool = False,
 ) -> list[Predictor]:
     """One predictor for each record."""
-    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio, arm, sticks=sticks) for r in records]
+    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio, arm) for r in records]

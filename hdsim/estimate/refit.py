@@ -14,6 +14,7 @@ from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
 from hdsim.estimate.flanks import hear_flanks
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
+from hdsim.estimate.standstill import hear_standstill
 from hdsim.estimate.state import State
 from hdsim.estimate.unwound import turn_to_zero
 from hdsim.estimate.vector import Vector, sensitivities
@@ -96,6 +97,10 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
+    if hear_standstill(bench, found.state, found.predictions):
+        before = bench.predict(state)
+        found = fit(bench, state, freedoms, evaluations=5, rough=True)
+        align(bench, found)
     bench.hear_motion(found.state, found.predictions)
     hear_flanks(bench, found.state)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that

@@ -4,14 +4,23 @@ Coulomb friction at rest is whatever holds the shaft (Filippov 1988, Differentia
 Discontinuous Righthand Sides): no function of the motion, which is all that a prediction is given. Near rest
 it is one as far as the speed is known. With Gaussian errors of standard deviation s the mean of sign(v) is
 erf(v / (sqrt(2) s)), whose slope is that of tanh(v / (sqrt(pi / 2) s)); beyond 2 s the sign is certain.
+
+A model that sticks may stand for a drive that does, or for one that creeps a little before it slips. The data
+say which: the sharper sign is taken where it is clearly likelier while the shaft turns.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hdsim.drive.parameters import RESOLVED_RAD_PER_S, STICKS_RAD_PER_S
-from hdsim.estimate.records import Array, Mask
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.covariance import correlation
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import FEWEST_SAMPLES, Array, Mask
+from hdsim.estimate.state import State
 
 #: Standard deviations of a speed beyond which its sign is certain (95 %).
 CERTAIN = 2.0
@@ -20,6 +29,61 @@ SMOOTHED = float(np.sqrt(np.pi / 2.0))
 #: Samples on either side that count with one of unknown sign: where friction's jump can be seen, the motion's
 #: spline has knots that many samples apart, and smooths the jump in acceleration over them.
 BESIDE = 4
+#: Log-likelihood by which the sharper sign must be the better one: "very strong" (Kass and Raftery 1995).
+CLEARLY = 5.0
+
+
+def hear_standstill(bench: Bench, state: State, predictions: Sequence[Array]) -> bool:
+    """Take the sign of friction as sharp as the speed is known, where that is clearly likelier.
+
+    The motor's torque at rest counts no longer then.
+
+    Args:
+        bench: the measured series; predictors and masks are changed.
+        state: the model, at fitted numbers.
+        predictions: its predictions.
+
+    Returns:
+        Whether it was taken.
+    """
+    friction = state.drive.friction
+    if not friction.sticks or max(friction.coulomb_nm, friction.load_coefficient) == 0.0:
+        return False
+    kept = [predictor.smoothing for predictor in bench.predictors]
+    for predictor in bench.predictors:
+        predictor.smoothing = resolution(predictor.motor_velocity, predictor.disturbed().motor_velocity)
+    turning = [
+        ~standing(bench.predictors[s.record].motor_velocity, bench.predictors[s.record].smoothing)
+        if s.channel == "motor_torque"
+        else np.ones(len(s.train), dtype=bool)
+        for s in bench.series
+    ]
+    if not _likelier(bench, state, predictions, turning):
+        for predictor, smoothing in zip(bench.predictors, kept, strict=True):
+            predictor.smoothing = smoothing
+        return False
+    for series, rows in zip(bench.series, turning, strict=True):
+        # Of a record that hardly turns, what it has is better than nothing.
+        if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
+            series.train, series.hold = series.train & rows, series.hold & rows
+    return True
+
+
+def _likelier(bench: Bench, state: State, predictions: Sequence[Array], turning: Sequence[Mask]) -> bool:
+    """Whether the predictors' present sign explains the motor's torque clearly better than before."""
+    try:
+        sharper = bench.residuals(bench.predict(state))
+    except PredictionError:
+        return False
+    smooth, better = bench.residuals(predictions), 0.0
+    for series, before, now, rows in zip(bench.series, smooth, sharper, turning, strict=True):
+        rows = series.train & rows
+        if series.channel != "motor_torque" or not len(now) or not rows.any():
+            continue
+        before, now = before[rows], now[rows]
+        independent = correlation(now, series.block[rows]) * max(float(np.mean(now**2)), series.noise**2)
+        better += 0.5 * (float(np.sum(before**2)) - float(np.sum(now**2))) / independent
+    return better > CLEARLY
 
 
 def resolution(speed: Array, again: Array) -> float:

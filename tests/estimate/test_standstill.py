@@ -9,6 +9,7 @@ import hdsim
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
+from hdsim.estimate.refit import refit
 from hdsim.estimate.standstill import resolution, standing
 from hdsim.estimate.state import state_of
 
@@ -36,21 +37,46 @@ def base(tmp_path_factory):
     return hdsim.load_scenario(path)
 
 
-@pytest.fixture(scope="module")
-def record(base):
-    run, rng = hdsim.simulate(base), np.random.default_rng(2)
+def recorded(scenario):
+    run, rng = hdsim.simulate(scenario), np.random.default_rng(2)
     return Record(
         "r", run.time, {c: run[c] + s * rng.standard_normal(len(run.time)) for c, s in NOISE.items()}
     )
 
 
-def test_a_sticking_drive_is_predicted_to_its_noise_while_it_turns(base, record):
+@pytest.fixture(scope="module")
+def record(base):
+    return recorded(base)
+
+
+def fitted(record, base):
+    """The compared series after a re-fit and what it leaves of it."""
     bench = bench_for([record], [], base)
-    (series,), (rest,) = bench.series, bench.residuals(bench.predict(state_of(base)))
+    found = refit(bench, state_of(base))
+    (series,), (rest,) = bench.series, bench.residuals(found.fit.predictions)
+    return bench, series, rest
+
+
+def test_a_sticking_drive_is_predicted_to_its_noise_while_it_turns(base, record):
+    bench, series, rest = fitted(record, base)
     counted = series.train | series.hold
+    assert bench.predictors[0].smoothing < 0.1
     assert counted.mean() > 0.8
     assert np.std(rest[counted]) < 1.1 * series.noise
     assert np.std(rest) > 2.0 * series.noise  # at rest the torque is what holds it
+
+
+def creeping(base):
+    friction = base.drive.friction.model_copy(update={"smoothing_velocity_rad_per_s": 0.5})
+    return base.model_copy(update={"drive": base.drive.model_copy(update={"friction": friction})})
+
+
+def test_a_drive_that_creeps_is_not_taken_for_one_that_sticks(base):
+    bench, series, rest = fitted(recorded(creeping(base)), base)
+    counted = series.train | series.hold
+    assert bench.predictors[0].smoothing == 0.5
+    assert counted[series.block > 0].all()
+    assert np.std(rest[counted]) < 1.1 * series.noise
 
 
 @pytest.mark.slow
@@ -58,11 +84,10 @@ def test_where_nothing_is_hidden_sticking_is_no_effect(base, record):
     assert diagnose([record], base).verdict.verdict == "nothing"
 
 
-def test_a_chosen_smoothing_speed_creeps_and_counts_at_rest(base, record):
-    friction = base.drive.friction.model_copy(update={"smoothing_velocity_rad_per_s": 0.5})
-    creeps = base.model_copy(update={"drive": base.drive.model_copy(update={"friction": friction})})
-    (series,) = bench_for([record], [], creeps).series
-    assert (series.train | series.hold)[record.time > 0.05].all()
+def test_a_chosen_smoothing_speed_is_kept(base, record):
+    bench, series, _ = fitted(record, creeping(base))
+    assert bench.predictors[0].smoothing == 0.5
+    assert (series.train | series.hold)[series.block > 0].all()
 
 
 def test_a_sign_is_smoothed_as_errors_of_the_speed_do():
