@@ -64,10 +64,8 @@ def _put_in(line: Line) -> str:
     Of the names only those count that the recording as it is does not get, and that its joint is not known
     to deserve.
     """
-    truth = set().union(*line["truth"])
-    before = {name for group in groups(line["without"]) for name in group} | set(line["setup"].get("own", []))
-    at = line["setup"].get("at")
-    new = [group for group in groups(line) if not set(group) & before]
+    truth, at = set().union(*line["truth"]), line["setup"].get("at")
+    new = [groups(line)[k] for k in _new(line)]
     if truth and _named(line, truth, at) and not _named(line["without"], truth, at):
         return "right"
     if any(not set(group) & truth for group in new):
@@ -78,26 +76,49 @@ def _put_in(line: Line) -> str:
     return "nothing" if truth else "right"
 
 
+def _new(line: Line) -> list[int]:
+    """Which names neither the recording as it is gets nor its joint is known to deserve."""
+    before = {name for group in groups(line["without"]) for name in group} | set(line["setup"].get("own", []))
+    return [k for k, group in enumerate(groups(line)) if not set(group) & before]
+
+
+def _speaks(line: Line) -> int | None:
+    """Which name of a recording of a real machine its stated confidence is about.
+
+    The first that is new, or what was put in; where none is, the first that its joint is known to deserve.
+    Of any other nobody knows whether it is right.
+    """
+    truth, at, known = set().union(*line["truth"]), line["setup"].get("at"), set(line["setup"].get("own", []))
+    new = {*_new(line), *(k for k in range(len(groups(line))) if _is(line, k, truth, at))}
+    own = (k for k, group in enumerate(groups(line)) if set(group) & known)
+    return min(new) if new else next(own, None)
+
+
 def _named(line: Line, truth: set[str], at: dict[str, Any] | None) -> bool:
-    """Whether a name is given, with a component of the right order, within a factor of two of its size.
+    """Whether a name is given, with a component of the right order, within a factor of two of its size."""
+    return any(_is(line, k, truth, at) for k in range(len(groups(line))))
+
+
+def _is(line: Line, k: int, truth: set[str], at: dict[str, Any] | None) -> bool:
+    """Whether an effect of a verdict is the true one.
 
     Another name that the data cannot tell from it counts with a component of that order only, in whatever
     unit: two that can stand in for one another at some order are not the same thing at another.
     """
-    for effect, group in zip((line["verdict"] or {}).get("effects", []), groups(line), strict=True):
-        if not _holds(group, truth):
-            continue
-        components = _components(effect)
-        if at is None or (effect["name"] in truth and not components):
+    effect = line["verdict"]["effects"][k]
+    if not _holds(groups(line)[k], truth):
+        return False
+    components = _components(effect)
+    if at is None or (effect["name"] in truth and not components):
+        return True
+    for one in components:
+        size = one.get(at["field"]) if effect["name"] in truth else None
+        if size is not None and at["field"] == "cogging_nm":
+            # What was put in is what the current reads; what is fitted is the torque behind its gain.
+            size *= _gain_of(line)
+        same = abs(one["order"] / at["order"] - 1.0) < 0.01 and one.get("per") != "output_turn"
+        if same and (size is None or 0.5 < abs(size / at["size"]) < 2.0):
             return True
-        for one in components:
-            size = one.get(at["field"]) if effect["name"] in truth else None
-            if size is not None and at["field"] == "cogging_nm":
-                # What was put in is what the current reads; what is fitted is the torque behind its gain.
-                size *= _gain_of(line)
-            same = abs(one["order"] / at["order"] - 1.0) < 0.01 and one.get("per") != "output_turn"
-            if same and (size is None or 0.5 < abs(size / at["size"]) < 2.0):
-                return True
     return False
 
 
@@ -148,8 +169,14 @@ def false_alarm(line: Line) -> bool:
 
 
 def stated(line: Line) -> float | None:
-    """Confidence that the verdict states: its own, else that of its first name; ``None`` without one."""
+    """Confidence that the verdict states: its own, else that of its first name; ``None`` without one.
+
+    Of a recording of a real machine, which has names of its own, that of the name of ``_speaks``.
+    """
     verdict = line["verdict"] or {}
+    if "without" in line and verdict.get("effects"):
+        which = _speaks(line)
+        return None if which is None else float(verdict["effects"][which]["confidence"])
     if verdict.get("confidence") is not None:
         return float(verdict["confidence"])
     return float(verdict["effects"][0]["confidence"]) if verdict.get("effects") else None
@@ -253,6 +280,10 @@ def _same_order(path: str, expected: dict[str, float], given: dict[str, Any]) ->
 def borne_out(line: Line) -> bool:
     """Whether what the stated confidence is about is true: the first name, or the verdict without one."""
     names = groups(line)
-    if not names or "without" in line:
+    if not names:
         return outcome(line) == "right"
+    if "without" in line:
+        which = _speaks(line)
+        truth, at = set().union(*line["truth"]), line["setup"].get("at")
+        return which is not None and (which not in _new(line) or _is(line, which, truth, at))
     return any(_holds(names[0], set(wanted)) for wanted in line["truth"])

@@ -60,6 +60,9 @@ against a locked output.
 *after* a least-squares fit of channel offsets and of the plant's sensitivities to its own inertias,
 stiffness, damping, friction, weight and torque constant: what a wrong parameter explains as well cannot be
 distinguished from one. The change is computed along the same motor motion, with and without the effect.
+Of a recording, the noise is what such a fit leaves of it (with a weight, an error of the output's turn and
+the orders that its source names): the sensor's noise and whatever the machine has beyond these. It is not
+white, so both are compared frequency by frequency (Welch), as a matched filter would.
 
 An experiment that is not sampled finely enough is drawn again: the plant, moved along a cubic through the
 samples, must reproduce the readings within 0.3 of the noise or a tenth of the effect. One in which the effect
@@ -72,7 +75,10 @@ page of this version none is left out. Its test cases are of a seed of which no 
 the search was last changed: as many as could be run in the time available. A rule that was tried then and
 withdrawn had identified the right effect in one recording; that case is judged by the rules as they are. The
 judgement of recordings was corrected afterwards: a ripple's size is compared as the current reads it, behind
-the fitted gain. Calibration cases are of several states of the search, each as it was last run.
+the fitted gain; the stated confidence is that of what was injected or is known, see below. The page's
+recordings were drawn before their strengths were defined as above: theirs are over the sensor's noise alone,
+two to twenty times larger, and their kinematic errors lack what the load's torque adds to the motor's
+(virtual work). Calibration cases are of several states of the search, each as it was last run.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, with their evidence: `python tests/blind
 page` generates the page from them, and `decide` can judge every one again.
@@ -86,6 +92,11 @@ where nothing is hidden or a parameter is wrong. A diagnosis that stops with an 
 held-out residual is what is left beyond the sensors' errors; in the `toothed` family, of cases run since,
 beyond what the plant itself leaves when its motor is moved as the log tells: a load that rattles in its play
 rests where the last bounce left it, which no log has.
+
+A recording has effects of its own. Of its effects those count as new that are not identified without the
+injected one and that its source does not list. The stated confidence is that of the first new one or of the
+injected one; where there is neither, of the first that its source lists, which is right. Of any other nobody
+knows whether it is right: such a case says nothing about confidence.
 """
 
 

@@ -121,6 +121,27 @@ def test_confidence_counts_the_first_name_and_a_verdicts_own_where_there_is_one(
     assert borne_out(silent)
 
 
+RIPPLE = ("sensors", 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "before", "wanted"),
+    [
+        # What was put in speaks, wherever it stands, and a new name that is wrong.
+        ((RIPPLE, ("kinematic_error", 2.0, 9.0)), (RIPPLE,), (0.7, True)),
+        ((RIPPLE, ("unbalance", 0.0, 0.0)), (RIPPLE,), (0.7, False)),
+        # Its source says that the joint's sensor ripples: that is right, whatever was missed beside it.
+        ((OWN, RIPPLE), (OWN, RIPPLE), (0.7, True)),
+        # Of what the recording gets anyway nobody knows whether it is right.
+        ((OWN,), (OWN,), (None, False)),
+    ],
+)
+def test_confidence_in_a_recording_is_that_of_what_was_put_in_or_is_known(names, before, wanted):
+    one = real("effect", *names, before=before)
+    one["verdict"]["effects"][-1]["confidence"] = 0.7 if len(names) > 1 else 0.9
+    assert (stated(one), borne_out(one)) == wanted
+
+
 def test_calibration_error_is_the_distance_of_shares_from_what_was_stated():
     lines = [line("effect", ONE, "effect", ["stribeck_friction" if k < 6 else "x"]) for k in range(10)]
     assert calibration_error(lines) == (pytest.approx(0.3), 10)
