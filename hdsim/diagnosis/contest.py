@@ -144,6 +144,7 @@ def contest(
         if loss <= LEFT_IN * least and not full:
             tell(f"fitting {name} in full")
             keep(name, _fully(bench, base, found))
+            keep(name, _at_next_minima(bench, base, best[name][1]))
             full = True
         known[name] = best[name][1], full
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
@@ -308,6 +309,32 @@ def _fully(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
                    known=known, rough=True)  # fmt: skip
         return [full]
     return []
+
+
+def _at_next_minima(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
+    """An effect's fits from where its cost may have its next minima, carried on where they leave less."""
+    added = found.state.added[-1]
+    others = [
+        replace(
+            added,
+            coefficients=(1.0,) * len(added.coefficients),
+            shapes=(*added.shapes[:k], v, *added.shapes[k + 1 :]),
+        )
+        for k, shape in enumerate(added.fitting.shapes)
+        for v in shape.next_minima(added.shapes[k])
+    ]
+    several: list[Fit] = []
+    if others:
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            there = _at(bench, base, found.theta)
+            for other in others:
+                several += _from(bench, base, there, other)
+    # From another minimum's numbers the way is long: a few steps say nothing yet.
+    ends = [full for each in several for full in _fully(bench, base, each)]
+    nearest = min(ends, key=lambda each: bench.power(each.predictions), default=None)
+    if nearest is not None and bench.power(nearest.predictions) <= LEFT_IN * bench.power(found.predictions):
+        ends += _fully(bench, base, nearest)
+    return ends
 
 
 def _power(bench: Bench, rest: Array) -> float:

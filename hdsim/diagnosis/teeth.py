@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from hdsim.diagnosis.half_gap import half_gap_ends, half_gap_with, own_half_gap
 from hdsim.diagnosis.verdict import IdentifiedEffect, TeethFound
 from hdsim.drive.parameters import LumpedMesh, ToothedMesh
 from hdsim.drive.play_as_teeth import PlayAsTeeth, half_gap_of_play, play_as_teeth
@@ -17,16 +16,22 @@ from hdsim.errors import PhysicsError
 from hdsim.estimate.found import ParameterEstimate
 
 if TYPE_CHECKING:
+    from hdsim.estimate.bench import Bench
+    from hdsim.estimate.fit import Fit
     from hdsim.estimate.state import State
     from hdsim.parts import OfTeeth
 
 
-def teeth_found(effects: Sequence[IdentifiedEffect], state: State) -> TeethFound | None:
+def teeth_found(
+    effects: Sequence[IdentifiedEffect], state: State, data: tuple[Bench, Fit] | None = None
+) -> TeethFound | None:
     """What the named effects say of the teeth; None where they say nothing.
 
     Args:
         effects: as named.
         state: the model with them.
+        data: the measured series and the fit that the state is of; without, a half-gap's interval holds for
+            the model's own flanks and engagement alone.
     """
     found = TeethFound()
     for effect in effects:
@@ -36,7 +41,7 @@ def teeth_found(effects: Sequence[IdentifiedEffect], state: State) -> TeethFound
         if of.says == "place":
             _place(found, effect, of, state)
         elif isinstance(state.drive.mesh, ToothedMesh):
-            _gap(found, effect, of, state)
+            _gap(found, effect, of, state, data)
         elif isinstance(state.drive.mesh, LumpedMesh) and of.play_arcmin > 0.0:
             _play(found, effect, of, state)
     return found if found.sentences else None
@@ -61,26 +66,23 @@ def _place(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: Stat
     )
 
 
-def _gap(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State) -> None:
+def _gap(
+    found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State, data: tuple[Bench, Fit] | None
+) -> None:
     """The mean half-gap of a mesh with teeth."""
-    mesh, drive = state.drive.mesh, state.drive
-    start = mesh.gap_factor * (
-        mesh.half_gap_m
-        if mesh.half_gap_m is not None
-        else float(np.mean(mesh.flanks.half_gaps(drive.geometry.flexspline_teeth, state.seed)))
-    )
     change = effect.parameters[of.field]
-    ends = [change.value, *(change.interval or ())]
-    if of.says == "growth":
-        gaps = [1e6 * start * (1.0 + end) for end in ends]
-    else:
-        gaps = [1e6 * (start + of.play_arcmin * half_gap_of_play(drive, end * ARCMIN)) for end in ends]
+    gap, *ends = (half_gap_with(of, state, end) for end in (change.value, *(change.interval or ())))
+    whole = half_gap_ends(*data, effect.name, of, change.value) if data is not None and ends else None
+    ends = list(whole or ends)
+    start = 1e6 * own_half_gap(state)
     found.half_gap_um = ParameterEstimate(
-        value=gaps[0], interval=(min(gaps[1:]), max(gaps[1:])) if gaps[1:] else None, start=1e6 * start
+        value=1e6 * gap, interval=(1e6 * min(ends), 1e6 * max(ends)) if ends else None, start=start
     )
+    said = "With the model's engagement and flanks the" if whole is None else "The"
+    unknown = "" if whole is None else ", whatever flanks the drive has drawn and whichever are worn,"
     found.sentences.append(
-        f"With the model's engagement and flanks the teeth's mean half-gap is {gaps[0]:.3g} µm"
-        f"{_ends(found.half_gap_um)} instead of {1e6 * start:.3g}."
+        f"{said} teeth's mean half-gap is {1e6 * gap:.3g} µm{_ends(found.half_gap_um)}{unknown} instead of "
+        f"{start:.3g}."
     )
 
 

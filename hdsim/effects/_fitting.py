@@ -66,6 +66,7 @@ class Shape:
         linear: the field is an angle or the like, whose neighbours lie at differences, not at ratios.
         least: what lies below is another effect's; divided like the starts.
         most: the same for what lies above.
+        apart: factor between values at which a fit may end, where its cost has several minima; 1: one only.
     """
 
     path: str
@@ -74,6 +75,7 @@ class Shape:
     linear: bool = False
     least: float = 0.0
     most: float = math.inf
+    apart: float = 1.0
 
     def neighbours(self, value: float, times: int) -> tuple[float, float]:
         """Values on both sides at the half of the starts' distance, halved ``times`` times.
@@ -87,6 +89,12 @@ class Shape:
             return value - part * self.distance, value + part * self.distance
         ratio = self.starts[1] / self.starts[0] if len(self.starts) > 1 else ALONE
         return max(float(value / ratio**part), self.least), min(float(value * ratio**part), self.most)
+
+    def next_minima(self, value: float) -> list[float]:
+        """Values where the cost may have its next minima, within the fitting's own range."""
+        if self.apart == 1.0:
+            return []
+        return [v for v in (value / self.apart, value * self.apart) if self.least <= v <= self.most]
 
     @property
     def distance(self) -> float:

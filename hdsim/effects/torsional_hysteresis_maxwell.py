@@ -96,7 +96,8 @@ class TorsionalHysteresisMaxwell(Effect):
         Fitting(
             (Amplitude({"slip_torque_nm": 1.0}),),
             # Over less it would be a friction at the output, over more a spring.
-            (Shape("slip_twist_scale", (0.5, 1.0), least=0.1, most=2.0),),
+            # Shifted by one, the elements that slip at 0.1, 0.3 and 0.8 mrad almost cover one another.
+            (Shape("slip_twist_scale", (0.5, 1.0), least=0.1, most=2.0, apart=math.sqrt(8.0)),),
         ),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation, robust_covariance
 from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
-from hdsim.estimate.flanks import hear_flanks
+from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
 from hdsim.estimate.standstill import hear_standstill
@@ -126,6 +126,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     if late and left > 0 and bench.power(late.predictions) - noise < ALL * left:
         found = late
         reweigh(bench, found)
+    widen_by_flanks(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
 
 
@@ -198,6 +199,7 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
         # numbers share by their priors, and none seems known because another was held.
         whole = fit(bench, whole.state, [*at_present(whole), *left], prune=False, after=readings)
     _widened(bench, whole)
+    widen_by_flanks(bench, whole)
     return whole
 
 

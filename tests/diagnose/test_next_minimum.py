@@ -1,0 +1,100 @@
+"""Maxwell elements shifted by one almost cover one another: a fit does not end at the wrong ones."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hdsim
+from hdsim.diagnosis.contest import contest
+from hdsim.diagnosis.screen import Residual
+from hdsim.diagnosis.search import left_of
+from hdsim.diagnosis.starts import starts
+from hdsim.diagnosis.traces import Screened, traces
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, added_spreads
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.records import Record
+from hdsim.estimate.refit import refit, together
+from hdsim.estimate.state import state_of
+from hdsim.estimate.write import fitted_numbers
+from hdsim.scenario import Scenario
+
+MAXWELL = "torsional_hysteresis_maxwell"
+NOISE = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3}
+
+
+def scenario(effects: dict[str, Any]) -> Scenario:
+    return Scenario.model_validate({
+        "drive": {"preset": "seed-2021", "mesh": {"model": "lumped"}},
+        "effects": effects,
+        "command": {"motor": {
+            "type": "position",
+            "at": "output",
+            "trajectory": {"type": "sine", "amplitude_deg": 30.0, "frequency_hz": 0.25},
+            "controller": {
+                "type": "cascade",
+                "position_gain_per_s": 30,
+                "velocity_gain_nm_s_per_rad": 0.025,
+                "velocity_integral_gain_nm_per_rad": 0.5,
+            },
+        }},
+        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
+        "run": {"duration_s": 8.0, "sample_rate_hz": 250.0},
+    })  # fmt: skip
+
+
+def opened(slip_nm: float, scale: float) -> tuple[Bench, Fit]:
+    run = hdsim.simulate(scenario({MAXWELL: {"slip_torque_nm": slip_nm, "slip_twist_scale": scale}}))
+    rng = np.random.default_rng(0)
+    channels = {c: run[c] + size * rng.standard_normal(len(run.time)) for c, size in NOISE.items()}
+    base = scenario({})
+    bench = bench_for([Record("r", run.time, channels)], [], base, None)
+    return bench, refit(bench, state_of(base)).fit
+
+
+def on_screen(bench: Bench, base: Fit, left: Residual, scale: float) -> Screened:
+    """The effect as a screen has it that took the scale for a given one."""
+    (fitting,) = catalogue()[MAXWELL].fittings
+    (first, *_) = starts(MAXWELL, fitting, (), bench.ranges(base.state))
+    wanted = float(np.sqrt(left.power / len(left.values)))
+    ((added, columns),) = traces(
+        bench, base.state, base.predictions, [replace(first, shapes=(scale,))], wanted
+    )
+    assert columns is not None
+    share = left.share(columns)
+    return Screened(MAXWELL, replace(added, coefficients=tuple(share.coefficients)), share, columns)
+
+
+@pytest.mark.parametrize(
+    ("slip_nm", "scale"),
+    [
+        (2.0, 1.0),
+        pytest.param(1.0, 1.0, marks=pytest.mark.slow),
+        pytest.param(3.0, 0.8, marks=pytest.mark.slow),
+    ],
+)
+def test_a_fit_that_begins_at_the_next_minimum_ends_at_the_true_slip_torque(
+    slip_nm: float, scale: float
+) -> None:
+    bench, base = opened(slip_nm, scale)
+    left = left_of(bench, base)
+    with bench.coarse():
+        ((_, found, _),) = contest(bench, base, [on_screen(bench, base, left, 0.3)], left, None)
+    whole = together(bench, found)
+    ((added, covariance, shapes),) = added_spreads(whole)
+    numbers = fitted_numbers(added, covariance, shapes)
+    for name, true in (("slip_torque_nm", slip_nm), ("slip_twist_scale", scale)):
+        low, high = numbers[name].interval or (np.nan, np.nan)
+        # Without the next minima the torque is half of it, and the scale 0.39.
+        assert low < true < high or numbers[name].value == pytest.approx(true, rel=0.15)
+
+
+def test_the_next_minima_stay_within_the_fittings_own_range() -> None:
+    (fitting,) = catalogue()[MAXWELL].fittings
+    (shape,) = fitting.shapes
+    assert shape.next_minima(0.39) == pytest.approx([0.39 / 8**0.5, 0.39 * 8**0.5])
+    assert shape.next_minima(1.0) == pytest.approx([1.0 / 8**0.5])
+    assert replace(shape, apart=1.0).next_minima(0.39) == []
