@@ -89,7 +89,7 @@ of the catalogue are the same physical phenomenon (two models of hysteresis; an 
 eccentric output), either is right. *Wrong effect* is a first group without the truth (or with more than three
 effects), *nothing* includes a parameter that is reported as wrong. A false alarm is an effect or `unknown`
 where nothing is hidden or a parameter is wrong. A diagnosis that stops with an error is wrong. The reducible
-held-out residual is what is left beyond the sensors' errors; in the `toothed` family, of cases run since,
+held-out residual is the part beyond the sensors' errors; in the `toothed` family, of cases run since,
 beyond what the plant itself leaves when its motor is moved as the log tells: a load that rattles in its play
 rests where the last bounce left it, which no log has.
 
