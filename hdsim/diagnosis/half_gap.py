@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,7 +80,7 @@ def half_gap_ends(
         return None
     k = names.index(effect)
     at = found.numbers_of(k)
-    if at.stop - at.start != 1:
+    if at.stop - at.start != 1 or state.added[k].coefficients[0] == 0.0:
         return None
     gap = half_gap_with(of, state, value)
     # Widths and growths are proportional to their coefficient.
@@ -90,20 +90,40 @@ def half_gap_ends(
         return np.asarray(slope * moves[:, at.start])
 
     variance = slope**2 * float(found.covariance[at.start, at.start])
-    others = drawn_anew(state)
-    if others:
-        moves = other_drives(bench, found, others)
+    variance += float(np.sum(moved(_engagement(bench, found)) ** 2))
+    wears = [_Wear(gap, state, of, value)]
+    if drawn_anew(state):
+        moves = other_drives(bench, found, drawn_anew(state))
         if moves is None:
             return None
-        # The fit's covariance knows what other flanks make of the wind-up, not that their own gaps differ.
-        gaps = np.array([half_gap_with(of, one, value) for one in others]) - gap
-        off = np.column_stack([moved(moves), moved(moves) - gaps])
-        blind, whole = np.diag(spread_of_draws(off))
-        variance += float(whole - blind)
-    variance += float(np.sum(moved(_engagement(bench, found)) ** 2))
-    half = 2.0 * math.sqrt(max(variance, 0.0))
-    means = [gap, *(_elsewhere(bench, found, k, of, gap, moved) if others else [])]
-    return max(min(means) - half, 0.0), max(means) + half
+        # The fit's covariance holds other flanks by what they move, not that their own gaps differ.
+        variance -= float(spread_of_draws(moved(moves)[:, None])[0, 0])
+        wears += _elsewhere(bench, found, k, of, gap, moved)
+    ends = []
+    for wear in wears:
+        half = 2.0 * math.sqrt(max(variance + _of_flanks(bench, found, wear, moved), 0.0))
+        ends += [wear.half_gap_m - half, wear.half_gap_m + half]
+    return max(min(ends), 0.0), max(ends)
+
+
+@dataclass(frozen=True)
+class _Wear:
+    """A way in which the gaps may have grown: the mean half-gap, a model, and what says so there."""
+
+    half_gap_m: float
+    state: State
+    of: OfTeeth
+    value: float
+
+
+def _of_flanks(bench: Bench, found: Fit, wear: _Wear, moved: Callable[[Array], Array]) -> float:
+    """Variance of the estimate over other flanks, whose differences grow where each gap does, m^2."""
+    others = drawn_anew(wear.state)
+    moves = other_drives(bench, found, others, wear.state) if others else None
+    if moves is None:
+        return 0.0
+    gaps = np.array([half_gap_with(wear.of, one, wear.value) for one in others]) - wear.half_gap_m
+    return float(spread_of_draws((moved(moves) - gaps)[:, None])[0, 0])
 
 
 def _engagement(bench: Bench, found: Fit) -> Array:
@@ -122,12 +142,12 @@ def _engagement(bench: Bench, found: Fit) -> Array:
 
 def _elsewhere(
     bench: Bench, found: Fit, k: int, of: OfTeeth, gap: float, moved: Callable[[Array], Array]
-) -> list[float]:
-    """Mean half-gaps that other teeth's wear would have, m: the same wind-up of gaps that grow otherwise."""
+) -> list[_Wear]:
+    """Other ways to grow with the same wind-up, each with its own mean half-gap."""
     state = found.state
     rest = replace(state, added=(*state.added[:k], *state.added[k + 1 :]))
     taken = {*state.effects, *(added.effect for added in rest.added)}
-    means = []
+    wears = []
     for name, effect in catalogue().items():
         says = effect.of_teeth
         if says is None or says.says not in ("play", "growth") or says.says == of.says or name in taken:
@@ -141,10 +161,11 @@ def _elsewhere(
                 if moves is None:
                     break
                 mean = gap - float(moved(moves)[0])
+            there = _with(rest, name, says, mean)
         except ValidationError:
             continue  # an effect that only widens says nothing of narrower gaps
-        means.append(mean)
-    return means
+        wears.append(_Wear(mean, there, says, _value(says, rest, mean)))
+    return wears
 
 
 def _with(state: State, name: str, of: OfTeeth, half_gap_m: float) -> State:
