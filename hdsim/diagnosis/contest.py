@@ -139,14 +139,16 @@ def contest(
                         keep(one.name, _from(bench, base, given, each.added))
     _after_the_best(bench, base, shortlist, best, keep, tell)
     least = min(loss for loss, _ in best.values())
-    for name, (loss, found) in list(best.items()):
-        full = name in known and known[name][1]
-        if loss <= LEFT_IN * least and not full:
-            tell(f"fitting {name} in full")
-            keep(name, _fully(bench, base, found))
-            keep(name, _at_next_minima(bench, base, best[name][1]))
-            full = True
-        known[name] = best[name][1], full
+    further = [name for name, (loss, _) in best.items() if loss <= LEFT_IN * least]
+    further = [name for name in further if name not in known or not known[name][1]]
+    for name in further:
+        tell(f"fitting {name} in full")
+        keep(name, _fully(bench, base, best[name][1]))
+    first = min(best, key=lambda name: best[name][0])
+    if first in further:
+        keep(first, _at_next_minima(bench, base, best[first][1]))
+    for name in best:
+        known[name] = best[name][1], name in further or (name in known and known[name][1])
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
 
 
