@@ -30,6 +30,7 @@ from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.errors import InputError
 from hdsim.estimate.baseline import trees, with_baselines
+from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Check
 from hdsim.estimate.fit import Fit, base_intervals
@@ -203,7 +204,7 @@ def _diagnosed(
         gap = with_baselines(bench, start, gap, black_box=black_box)
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
-    problems += [*doubts, *one_way(bench), *moving_zeros(bench, current.predictions)]
+    problems += [*doubts, *beginnings(bench), *one_way(bench), *moving_zeros(bench, current.predictions)]
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)

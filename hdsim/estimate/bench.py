@@ -48,6 +48,8 @@ class Bench:
         self.blocks = 0
         #: Predictions with the model's own flanks, then with others (``flanks.hear_flanks``).
         self.redrawn: list[list[Array]] = []
+        #: Time at the beginning of records that does not count, s (``hdsim.estimate.beginning``).
+        self.begins_s: dict[int, float] = {}
         #: Error of the short cut that was not taken (``hdsim.estimate.short_cut``), by channel.
         self.refused: dict[str, float] = {}
         for index, predictor in enumerate(self.predictors):

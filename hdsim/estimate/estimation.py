@@ -10,6 +10,7 @@ import numpy as np
 
 from hdsim.errors import InputError
 from hdsim.estimate.baseline import trees, with_baselines
+from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.data_problems import Problem
@@ -171,7 +172,7 @@ def estimate(
     gap = with_baselines(bench, start, gap, black_box=black_box)
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
-    problems += [*one_way(bench), *moving_zeros(bench, found.fit.predictions)]
+    problems += [*beginnings(bench), *one_way(bench), *moving_zeros(bench, found.fit.predictions)]
     own = found.fit.frees
     covariance, names = found.fit.covariance[: len(own), : len(own)], [each.name for each in own]
     matrix = correlations(covariance)

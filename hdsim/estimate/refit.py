@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation, robust_covariance
 from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
@@ -27,6 +28,8 @@ WEIGHINGS, ALIKE = 3, 1.5
 ALL = 0.1
 #: Part of what a re-fit leaves beside the noise that numbers which it did not move must explain to be moved.
 MUCH = 0.1
+#: Most times that the beginnings of records are asked.
+BEGINNINGS = 3
 #: Prior spreads that a number may have gone for a fit to begin at the given one too.
 FAR = 2.0
 #: What a fit may leave, in units of the noise, to count as one that has reached it.
@@ -93,14 +96,14 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     if frees is None:
         frees = base_freedoms(state, bench.channels, load_known=bench.load_known, locked=locked)
     freedoms = list(frees)
-    before = bench.predict(state)
-    bench.weigh(bench.residuals(before))
-    found = fit(bench, state, freedoms, evaluations=5, rough=True)
-    align(bench, found)
+    before, found = _roughly(bench, state, freedoms)
+    # A vibration at the beginning bends a fit, and one that is less bent shows more of it.
+    for _ in range(BEGINNINGS):
+        if not (hear_beginning(bench, before) or hear_beginning(bench, found.predictions)):
+            break
+        before, found = _roughly(bench, state, freedoms)
     if hear_standstill(bench, found.state, found.predictions):
-        before = bench.predict(state)
-        found = fit(bench, state, freedoms, evaluations=5, rough=True)
-        align(bench, found)
+        before, found = _roughly(bench, state, freedoms)
     bench.hear_motion(found.state, found.predictions)
     hear_flanks(bench, found.state)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
@@ -128,6 +131,15 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         reweigh(bench, found)
     widen_by_flanks(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
+
+
+def _roughly(bench: Bench, state: State, freedoms: Sequence[Free]) -> tuple[list[Array], Fit]:
+    """Predictions of the model as given, and a first fit."""
+    before = bench.predict(state)
+    bench.weigh(bench.residuals(before))
+    found = fit(bench, state, freedoms, evaluations=5, rough=True)
+    align(bench, found)
+    return before, found
 
 
 def _with_those_left(bench: Bench, found: Fit) -> Fit:

@@ -1,0 +1,69 @@
+"""A log that begins while the load still swings: its start is nobody's to know, and no number's to follow."""
+
+import numpy as np
+import pytest
+
+import hdsim
+from hdsim.estimate.beginning import EARLY, STRETCHES, beginnings, hear_beginning
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.records import Record
+from hdsim.estimate.refit import refit
+from hdsim.estimate.state import state_of
+from hdsim.scenario import Scenario
+
+NOISE = {"motor_angle": 1e-4, "motor_torque": 1.8e-3, "output_angle": 3e-6}
+# The command's sine begins at its full speed, which sets the load swinging.
+SCENARIO = Scenario.model_validate({
+    "drive": {"preset": "csg-14-50", "mesh": {"model": "lumped"}},
+    "command": {"motor": {
+        "type": "position",
+        "at": "output",
+        "trajectory": {"type": "sine", "amplitude_deg": 22.0, "frequency_hz": 0.31},
+        "controller": {
+            "type": "cascade",
+            "position_gain_per_s": 30,
+            "velocity_gain_nm_s_per_rad": 0.0094,
+            "velocity_integral_gain_nm_per_rad": 0.19,
+        },
+    }},
+    "load": {"inertia_kg_m2": 0.1875, "gravity": {"mass_kg": 1.5, "centre_of_mass_m": 0.3}},
+    "run": {"duration_s": 15.0, "sample_rate_hz": 500.0},
+})  # fmt: skip
+
+
+def measured(begins_s: float) -> Record:
+    """The scenario's run from a time on."""
+    run = hdsim.simulate(SCENARIO)
+    rng = np.random.default_rng(1)
+    rows = run.time >= begins_s
+    return Record(
+        "run",
+        run.time[rows] - begins_s,
+        {c: run[c][rows] + size * rng.standard_normal(rows.sum()) for c, size in NOISE.items()},
+    )
+
+
+@pytest.mark.parametrize("begins_s", [0.0, 5.0])
+def test_a_vibration_at_the_beginning_bends_no_number(begins_s):
+    """In the log at 0; at 5 s in the prediction, which knows nothing of the acceleration before."""
+    bench = bench_for([measured(begins_s)], [], SCENARIO, None)
+    found = {one.name: one for one in refit(bench, state_of(SCENARIO)).intervals}
+    # Counted, that at 0 leaves a spring softer by a third, and half as much again of motor torque.
+    assert found["drive.torsion.stiffness_k1_nm_per_rad"].value == pytest.approx(3400.0, rel=0.06)
+    assert found["motor_torque_gain"].value == pytest.approx(1.0, abs=0.06)
+    [said] = beginnings(bench)
+    assert said.kind == "beginning"
+    assert 0.2 < bench.begins_s[0] <= (15.0 - begins_s) * EARLY / STRETCHES
+
+
+def test_by_chance_one_beginning_in_ninety_one_is_left_out():
+    bench = bench_for([measured(5.0)], [], SCENARIO, None)
+    own = bench.predict(state_of(SCENARIO))
+    rng, heard = np.random.default_rng(2), 0
+    kept = [(series.train, series.hold) for series in bench.series]
+    for _ in range(400):
+        for series, predicted, (train, hold) in zip(bench.series, own, kept, strict=True):
+            series.measured = predicted + rng.standard_normal(len(predicted))
+            series.train, series.hold = train, hold
+        heard += hear_beginning(bench, own)
+    assert 0 <= heard <= 12  # of 400 with a chance of 1/91: more in one case of a thousand
