@@ -1,12 +1,12 @@
 """Records that begin in the middle of a motion, of whose vibration a model knows neither size nor phase.
 
-A prediction begins as if the motion had always gone on at its first speed. Where it had not, the load swings,
-in the log or in the prediction, and dies down at a rate that nobody knows, for damping is a guess; a fit would
-bend every number of the model to follow it. So its place is asked, not its law. Of a hundred stretches of a
-record that are all alike, the first leaves more than each of the ninety beyond the first tenth in one case of
-91 (a rank test: E. L. Lehmann, *Nonparametrics*, Springer 2006, section 1.2). Then it does not count, nor do
-those that follow it up to the first that leaves no more than they do. By chance that costs a hundredth of a
-record; where something missing acts at the beginning most, a tenth of it at most.
+A prediction begins as if the motion had always gone on at its first speed. Where it had not, the load
+swings, in the log or in the prediction, and dies down at a rate that nobody knows, for damping is a guess;
+a fit would bend every number of the model to follow it. So its place is asked, not its law. Of a hundred
+stretches of a record that are all alike, the first leaves more than each of the ninety beyond the first
+tenth in one case of 91 (a rank test: E. L. Lehmann, *Nonparametrics*, Springer 2006, section 1.2). Then it
+does not count, nor do those that follow it up to the first that leaves no more than they do. By chance that
+costs a hundredth of a record; where something missing acts at the beginning most, a tenth of it at most.
 """
 
 from __future__ import annotations
