@@ -1,12 +1,13 @@
 """Records that begin in the middle of a motion, of whose vibration a model knows neither size nor phase.
 
-A prediction begins as if the motion had always gone on at its first speed. Where it had not, the load
-swings, in the log or in the prediction, and dies down at a rate that nobody knows, for damping is a guess;
-a fit would bend every number of the model to follow it. So its place is asked, not its law. Of a hundred
-stretches of a record that are all alike, the first leaves more than each of the ninety beyond the first
-tenth in one case of 91 (a rank test: E. L. Lehmann, *Nonparametrics*, Springer 2006, section 1.2). Then it
-does not count, nor do those that follow it up to the first that leaves no more than they do. By chance that
-costs a hundredth of a record; where something missing acts at the beginning most, a tenth of it at most.
+A prediction begins as if the motion had always gone on at its first speed. Where it had not, nor begins at
+rest, the load swings, in the log or in the prediction, and dies down at a rate that nobody knows, for
+damping is a guess; a fit would bend every number of the model to follow it. So its place is asked, not its
+law. Of a hundred stretches of a record that are all alike, the first leaves more than each of the ninety
+beyond the first tenth in one case of 91 (a rank test: E. L. Lehmann, *Nonparametrics*, Springer 2006,
+section 1.2). Then it does not count, nor do those that follow it up to the first that leaves no more than
+they do. By chance that costs a hundredth of a record; where something missing acts at the beginning most, a
+tenth of it at most.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hdsim.estimate.bench import Bench
+from hdsim.estimate.bench import SETTLE_S, Bench
 from hdsim.estimate.data_problems import Problem
+from hdsim.estimate.predict import Predictor
 from hdsim.estimate.records import Array
+from hdsim.estimate.standstill import resolution, standing
 
 #: Stretches of a record, and those of them that may be left out; fewest samples in one of them.
 STRETCHES, EARLY, SAMPLES = 100, 10, 4
@@ -36,7 +39,7 @@ def hear_beginning(bench: Bench, predictions: Sequence[Array]) -> bool:
     residuals, heard = bench.residuals(predictions), False
     for index, predictor in enumerate(bench.predictors):
         time = predictor.record.time
-        if len(time) < SAMPLES * STRETCHES:
+        if len(time) < SAMPLES * STRETCHES or _at_rest(predictor):
             continue
         power, count = np.zeros(STRETCHES), np.zeros(STRETCHES)
         own = [k for k, s in enumerate(bench.series) if s.record == index and len(residuals[k])]
@@ -62,6 +65,13 @@ def hear_beginning(bench: Bench, predictions: Sequence[Array]) -> bool:
         bench.begins_s[index] = float(begins_s)
         heard = True
     return heard
+
+
+def _at_rest(predictor: Predictor) -> bool:
+    """Whether a record begins at rest, as its prediction does: then nothing swings yet."""
+    again = predictor.disturbed().motor_velocity
+    slow = standing(predictor.motor_velocity, resolution(predictor.motor_velocity, again))
+    return bool(slow[predictor.record.time - predictor.record.time[0] <= SETTLE_S].all())
 
 
 def beginnings(bench: Bench) -> list[Problem]:
