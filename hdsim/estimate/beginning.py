@@ -69,8 +69,8 @@ def hear_beginning(bench: Bench, predictions: Sequence[Array]) -> bool:
 
 def _at_rest(predictor: Predictor) -> bool:
     """Whether a record begins at rest, as its prediction does: then nothing swings yet."""
-    again = predictor.disturbed().motor_velocity
-    slow = standing(predictor.motor_velocity, resolution(predictor.motor_velocity, again))
+    speed = predictor.motor_velocity
+    slow = standing(speed, resolution(speed, predictor.speed_noise))
     return bool(slow[predictor.record.time - predictor.record.time[0] <= SETTLE_S].all())
 
 

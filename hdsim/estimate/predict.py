@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -136,21 +137,29 @@ class Predictor:
             seed: of the draw.
         """
         rng = np.random.default_rng([seed, 11])
-        found = copy(self)
-        coefficients = self._drawn(rng)
-        if coefficients is not None:
-            found._coefficients = self._factor * coefficients
-            found.turn(0.0)
+        found = self._moved(rng)
         if self._arm is not None:
             found.course = arm_course(self.record, self._arm, rng)
         return found
 
-    def _drawn(self, rng: np.random.Generator) -> Array | None:
-        """Coefficients (4, k) of the motion's reading drawn anew; None where it has no noise."""
+    @cached_property
+    def speed_noise(self) -> float:
+        """Standard deviation of what the motion's noise does to the motor's speed, rad/s."""
+        again = self._moved(np.random.default_rng([0, 11])).motor_velocity
+        return float(np.sqrt(np.mean((again - self.motor_velocity) ** 2)))
+
+    def _moved(self, rng: np.random.Generator) -> Predictor:
+        """The same record with the prescribed motion alone drawn anew."""
+        found = copy(self)
         if self._likeliest is not None:
-            return pieces_of(self._likeliest.disturbed(rng))[1]
-        smooth, step = self.motor_angle / self._factor, self._step(self.plan.motion)
-        return drawn_anew(self.record.time, self._reading, smooth, self._breaks, step, rng)
+            coefficients: Array | None = pieces_of(self._likeliest.disturbed(rng))[1]
+        else:
+            smooth, step = self.motor_angle / self._factor, self._step(self.plan.motion)
+            coefficients = drawn_anew(self.record.time, self._reading, smooth, self._breaks, step, rng)
+        if coefficients is not None:
+            found._coefficients = self._factor * coefficients
+            found.turn(0.0)
+        return found
 
     def _step(self, channel: str) -> float:
         """Step of a channel's sensor, as it is felt in the record."""

@@ -51,7 +51,7 @@ def hear_standstill(bench: Bench, state: State, predictions: Sequence[Array]) ->
         return False
     kept = [predictor.smoothing for predictor in bench.predictors]
     for predictor in bench.predictors:
-        predictor.smoothing = resolution(predictor.motor_velocity, predictor.disturbed().motor_velocity)
+        predictor.smoothing = resolution(predictor.motor_velocity, predictor.speed_noise)
     turning = [
         ~standing(bench.predictors[s.record].motor_velocity, bench.predictors[s.record].smoothing)
         if s.channel == "motor_torque"
@@ -86,18 +86,17 @@ def _likelier(bench: Bench, state: State, predictions: Sequence[Array], turning:
     return better > CLEARLY
 
 
-def resolution(speed: Array, again: Array) -> float:
+def resolution(speed: Array, noise: float) -> float:
     """Smoothing speed of the sign of a measured speed, rad/s; at most that of the effects' own formulas.
 
     A speed is known no better than its noise, nor than what it changes by between two samples.
 
     Args:
         speed: shape (n,), rad/s.
-        again: shape (n,), the same from other readings of the motion, rad/s.
+        noise: its standard deviation, rad/s.
     """
-    apart = float(np.sqrt(np.mean((again - speed) ** 2)))
     between = float(np.median(np.abs(np.diff(speed))))
-    return float(np.clip(SMOOTHED * np.hypot(apart, between), STICKS_RAD_PER_S, RESOLVED_RAD_PER_S))
+    return float(np.clip(SMOOTHED * np.hypot(noise, between), STICKS_RAD_PER_S, RESOLVED_RAD_PER_S))
 
 
 def standing(speed: Array, smoothing: float) -> Mask:
