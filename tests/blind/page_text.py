@@ -72,13 +72,8 @@ those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
 page of this version none is left out. Its test cases are of a seed of which no case had been looked at when
-the search was last changed: as many as could be run in the time available. A rule that was tried then and
-withdrawn had identified the right effect in one recording; that case is judged by the rules as they are. The
-judgement of recordings was corrected afterwards: a ripple's size is compared as the current reads it, behind
-the fitted gain; the stated confidence is that of what was injected or is known, see below. The page's
-recordings were drawn before their strengths were defined as above: theirs are over the sensor's noise alone,
-two to twenty times larger, and their kinematic errors lack what the load's torque adds to the motor's
-(virtual work). Calibration cases are of several states of the search, each as it was last run.
+the search was last changed: as many as could be run in the time available. Calibration cases are of several
+states of the search, each as it was last run.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, with their evidence: `python tests/blind
 page` generates the page from them, and `decide` can judge every one again.
@@ -89,7 +84,7 @@ of the catalogue are the same physical phenomenon (two models of hysteresis; an 
 eccentric output), either is right. *Wrong effect* is a first group without the truth (or with more than three
 effects), *nothing* includes a parameter that is reported as wrong. A false alarm is an effect or `unknown`
 where nothing is hidden or a parameter is wrong. A diagnosis that stops with an error is wrong. The reducible
-held-out residual is the part beyond the sensors' errors; in the `toothed` family, of cases run since,
+held-out residual is the part beyond the sensors' errors; in the `toothed` family
 beyond what the plant itself leaves when its motor is moved as the log tells: a load that rattles in its play
 rests where the last bounce left it, which no log has.
 
