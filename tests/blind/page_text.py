@@ -60,7 +60,7 @@ against a locked output.
 *after* a least-squares fit of channel offsets and of the plant's sensitivities to its own inertias,
 stiffness, damping, friction, weight and torque constant: what a wrong parameter explains as well cannot be
 distinguished from one. The change is computed along the same motor motion, with and without the effect.
-Of a recording, the noise is what such a fit leaves of it (with a weight, an error of the output's turn and
+Of a recording, the noise is the residual of such a fit (with a weight, an error of the output's turn and
 the orders that its source names): the sensor's noise and whatever the machine has beyond these. It is not
 white, so both are compared frequency by frequency (Welch), as a matched filter would.
 

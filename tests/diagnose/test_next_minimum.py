@@ -72,7 +72,6 @@ def on_screen(bench: Bench, base: Fit, left: Residual, scale: float) -> Screened
     ("slip_nm", "scale"),
     [
         (2.0, 1.0),
-        pytest.param(3.0, 0.8, marks=pytest.mark.slow),
     ],
 )
 def test_a_fit_that_begins_at_the_next_minimum_ends_at_the_true_slip_torque(
