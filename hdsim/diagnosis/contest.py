@@ -139,8 +139,8 @@ def contest(
                         keep(one.name, _from(bench, base, given, each.added))
     _after_the_best(bench, base, shortlist, best, keep, tell)
     least = min(loss for loss, _ in best.values())
-    further = [name for name, (loss, _) in best.items() if loss <= LEFT_IN * least]
-    further = [name for name in further if name not in known or not known[name][1]]
+    full = {name for name, (_, whole) in known.items() if whole}
+    further = [name for name, (loss, _) in best.items() if loss <= LEFT_IN * least and name not in full]
     for name in further:
         tell(f"fitting {name} in full")
         keep(name, _fully(bench, base, best[name][1]))
@@ -148,7 +148,7 @@ def contest(
     if first in further:
         keep(first, _at_next_minima(bench, base, best[first][1]))
     for name in best:
-        known[name] = best[name][1], name in further or (name in known and known[name][1])
+        known[name] = best[name][1], name in full or name in further
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
 
 
