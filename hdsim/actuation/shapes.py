@@ -39,6 +39,11 @@ class Shape(Parameters):
         """The signal from time 0."""
         return self.shape().delayed(self.start_time_s)
 
+    @property
+    def lasting(self) -> bool:
+        """Whether its numbers alone say what it is, and no file does."""
+        return True
+
 
 class Hold(Shape):
     """A constant."""
@@ -195,6 +200,11 @@ class Sequence(Shape):
         """The moves, joined."""
         return joined([move.move() for move in self.moves] * self.repeat, self.initial)
 
+    @property
+    def lasting(self) -> bool:
+        """Whether that of every move is."""
+        return all(move.lasting for move in self.moves)
+
 
 class Recorded(Shape):
     """A signal read from a CSV file with a header line; first and last value are held outside its times."""
@@ -208,6 +218,11 @@ class Recorded(Shape):
     interpolation: Literal["linear", "pchip", "spline"] = "linear"
     """Straight lines, monotone cubics with continuous slope, or a cubic spline with continuous curvature."""
     value_factor: float = 1.0
+
+    @property
+    def lasting(self) -> bool:
+        """The file may change."""
+        return False
 
     def shape(self) -> Move:
         """One cubic piece between each two samples.

@@ -8,8 +8,8 @@ Each shape of ``hdsim.actuation.shapes`` becomes one class per quantity, with on
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, cast, get_args, get_origin
 
@@ -132,12 +132,13 @@ class SignalModel(Parameters):
 
     @cached_property
     def data(self) -> SignalData:
-        """The signal made ready to run, in SI units.
+        """The signal made ready to run, in SI units; kept for signals of the same numbers.
 
         Raises:
             InputError: a recorded file cannot be read.
         """
-        return SignalData(self.si.move())
+        shape = self.si
+        return _kept(_Given(shape, type(shape), repr(shape))) if shape.lasting else SignalData(shape.move())
 
     @property
     def kernel(self) -> Kernel:
@@ -164,6 +165,21 @@ class SignalModel(Parameters):
     def values(self, times: ArrayLike) -> Array:
         """Value and three time derivatives, SI, shape (4, n), at ``times`` (s), shape (n,)."""
         return self.data.values(times)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """A shape; alike where kind and numbers are, which its text tells in full."""
+
+    shape: shapes.Shape = field(compare=False)
+    kind: type[shapes.Shape]
+    text: str
+
+
+@lru_cache(maxsize=32)
+def _kept(given: _Given) -> SignalData:
+    """A shape made ready: runs side by side, and a run and what is integrated beside it, share signals."""
+    return SignalData(given.shape.move())
 
 
 class _RecordedModel(SignalModel):

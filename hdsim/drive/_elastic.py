@@ -11,6 +11,7 @@ from hdsim.drive._layout import (
     COLUMNS,
     ENERGIES,
     GAIN,
+    GIVEN,
     HOUSING,
     HOUSING_INERTIA,
     INERTIA,
@@ -71,9 +72,14 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
 
     Mesh, kinematic error and ports see the angles from the housing, theta_a - b. So the housing's row is
     minus the sum of the three bodies' rows, in torques and in derivatives alike.
+
+    With ``integers[GIVEN]`` the scratch holds coordinates, kinematic error and mesh of a model that differs
+    in none of them and was evaluated just before at the same time and state.
     """
-    read_coordinates(t, y, integers, reals, scratch)
-    read_error(integers, reals, scratch)
+    given = integers[GIVEN] != 0
+    if not given:
+        read_coordinates(t, y, integers, reals, scratch)
+        read_error(integers, reals, scratch)
     angles = scratch[S_RELATIVE : S_RELATIVE + 3]
     seen = scratch[S_RELATIVE + 3 : S_RELATIVE + 6]
     velocities = scratch[S_VELOCITIES : S_VELOCITIES + 3]
@@ -82,7 +88,7 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     ring = integers[RING]
     if ring == RING_STATIC:
         balance_ring(integers, reals, scratch)
-    else:
+    elif not given:
         call_mesh(integers[MESH_ADDRESS], angles, error, reals[integers[MESH_AT] :], result)
     h_mm = result[_mesh_layout.HESSIAN]
     h_mf = result[_mesh_layout.HESSIAN + 1]
@@ -193,6 +199,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     # Fold the dependent columns into those of the angles and velocities.
     at = S_INPUTS + columns + rows
     full = scratch[at : at + rows * columns]
+    # Rows of energies that are no states, and those for the log, which have no derivatives.
+    unread = STORED if integers[ENERGIES] > 0 else DISSIPATED
     vm = seen[0]
     vo = seen[2]
     bent_m = error[3] * vm + error[4] * vo
@@ -202,6 +210,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         ring_curvature(integers, reals, scratch)
     ring_mm, ring_mo, ring_oo = scratch[S_RING_2], scratch[S_RING_2 + 1], scratch[S_RING_2 + 2]
     for r in range(rows):
+        if unread <= r < OWN:
+            continue
         row = full[r * columns : (r + 1) * columns]
         d_tau = row[TRANSMITTED_TORQUE]
         d_twist = row[TWIST]
@@ -240,6 +250,9 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         (slope_mo, -h_fo, bent * error[5] - h_oo + moved * ring_oo),
     )
     for a in range(3):
+        if a == 1 and ring != RING_DYNAMIC:
+            # No coordinate, no row: nor anything that the housing would feel.
+            continue
         through = slopes[a][0] + slopes[a][1] + slopes[a][2]
         for c in range(columns):
             by_ports = (

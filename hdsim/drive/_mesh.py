@@ -129,10 +129,3 @@ def lumped_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-d
     result[MESH_TWIST] = twist
     result[TWIST] = twist
     result[ENGAGED] = math.nan
-
-
-@mesh
-def given_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-def]
-    """What another mesh at the same angles came to."""
-    for k in range(RESULT_SIZE):
-        result[k] = parameters[k]

@@ -26,9 +26,9 @@ def step_each(  # type: ignore[no-untyped-def]
     """
     stops, cuts, progress = np.zeros(0), np.zeros(2), np.zeros(2, dtype=np.int64)
     t_eval, out = np.zeros(0), np.zeros((0, y.shape[1]))
-    others, near = np.zeros((0, reals.shape[1])), np.zeros((0, y.shape[1]))
-    lists, shared = np.zeros((0, len(integers)), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
-    slopes, sizes = np.zeros((0, y.shape[1])), np.zeros((0, y.shape[1]))
+    others, near = np.zeros((0, reals.shape[1])), np.zeros((y.shape[1], 0))
+    lists, shared = np.zeros((0, len(integers)), dtype=np.int64), np.zeros(0, dtype=np.bool_)
+    slopes, sizes = np.zeros((y.shape[1], 0)), np.zeros((y.shape[1], 0))
     beside = np.zeros((0, 0, y.shape[1]))
     for k in drives:
         cuts[0], cuts[1] = control[k, T], control[k, T_BOUND]

@@ -27,7 +27,7 @@ import numpy as np
 
 from hdsim._abi import call_system
 from hdsim._compile import compiled
-from hdsim.simulation._lu import factorise, solve
+from hdsim.simulation._lu import factorise, solve_all
 
 _jit: Any = compiled
 
@@ -42,18 +42,16 @@ _SMOOTH = 0.2
 
 
 @_jit
-def _pushes(address, t, y, own, lists, others, shared, scratch, kept, other, spare, dfdt, push):  # type: ignore[no-untyped-def]
+def _pushes(address, t, y, own, lists, others, shared, scratch, other, spare, dfdt, push):  # type: ignore[no-untyped-def]
     """Differences of the others' right-hand sides from the model's ``own``, computed just before."""
-    first = shared[0, 0]
-    for i in range(len(kept)):
-        kept[i] = scratch[first + i]
-    for b in range(others.shape[0]):
-        to = shared[b, 1]
-        if to >= 0:
-            others[b, to : to + len(kept)] = kept
-        call_system(address, t, y, lists[b], others[b], scratch, 0, other, spare, dfdt)
-        for i in range(len(y)):
-            push[b, i] = other[i] - own[i]
+    # First those that take something from the scratch: the rest fill it with their own.
+    for takes in (True, False):
+        for b in range(others.shape[0]):
+            if shared[b] != takes:
+                continue
+            call_system(address, t, y, lists[b], others[b], scratch, 0, other, spare, dfdt)
+            for i in range(len(y)):
+                push[i, b] = other[i] - own[i]
 
 
 @_jit
@@ -73,7 +71,7 @@ def _cornered(h, start, mid, end, near, sizes, bend):  # type: ignore[no-untyped
     With a jump of J, J at the first node is off the straight line between the ends by at least a third of the
     jump; where J is smooth, by a small part of its change. Work: ``bend`` (n, n) or larger.
     """
-    n, found = near.shape[1], False
+    n, found = near.shape[0], False
     for i in range(n):
         bent = False
         for j in range(n):
@@ -83,12 +81,23 @@ def _cornered(h, start, mid, end, near, sizes, bend):  # type: ignore[no-untyped
                 bend[i, j] = 0.0
             bent = bent or bend[i, j] != 0.0
         if bent and not found:
-            for b in range(near.shape[0]):
+            for b in range(near.shape[1]):
                 off = 0.0
                 for j in range(n):
-                    off += bend[i, j] * near[b, j]
-                found = found or abs(off) > _COUNTS * sizes[b, i]
+                    off += bend[i, j] * near[j, b]
+                found = found or abs(off) > _COUNTS * sizes[i, b]
     return found
+
+
+@_jit
+def _add_product(matrix, columns, to):  # type: ignore[no-untyped-def]
+    """Add matrix (n, n) times columns (n, k) to ``to`` (n, k)."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            factor = matrix[i, j]
+            if factor != 0.0:
+                for b in range(columns.shape[1]):
+                    to[i, b] += factor * columns[j, b]
 
 
 @_jit
@@ -117,39 +126,35 @@ def follow(  # type: ignore[no-untyped-def]
         address: of the system kernel; ``integers``, ``reals`` and ``scratch`` are its own.
         integers: see ``hdsim.system.System``.
         reals: of the model.
-        others: of those beside it, shape (k, reals); changed where they share.
+        others: of those beside it, shape (k, reals).
         lists: integers of those beside it, shape (k, integers).
-        shared: first place in the scratch, and in each other's reals (-1: in none), and number of what a
-            model beside this one takes from it instead of computing it, shape (k, 3).
+        shared: whether each takes from the scratch what the model has computed there, shape (k,).
         scratch: likewise.
         times: ends of the steps, shape (count + 1,) or longer.
         states: of the model there, shape (count + 1, n).
         pieces: the rest of its continuous extension, shape (count, 2, n).
         count: of the steps.
         fresh: whether something jumped where the first step begins, so that the slopes are to be made anew.
-        near: differences of the states, shape (k, n); updated.
-        slopes: their time derivatives, shape (k, n); updated.
-        sizes: the largest differences so far, shape (k, n); updated.
+        near: differences of the states, shape (n, k); updated.
+        slopes: their time derivatives, shape (n, k); updated.
+        sizes: the largest differences so far, shape (n, k); updated.
         t_eval: increasing times up to the end of the last step, shape (m,).
         out: gets the differences there, shape (k, m, n).
     """
     n, k = states.shape[1], others.shape[0]
     f, other, dfdt = np.empty(n), np.empty(n), np.empty(n)
-    between, mid, end = np.empty(n), np.empty(n), np.empty(n)
+    y_mid, y_end, mid, end = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    mid_scratch = np.zeros_like(scratch)
     at_start, at_mid, at_end = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    push_mid, push_end = np.empty((k, n)), np.empty((k, n))
+    push_mid, push_end = np.empty((n, k)), np.empty((n, k))
     matrix, inverse = np.empty((2 * n, 2 * n)), np.empty(2 * n)
-    pivots, both = np.empty(2 * n, dtype=np.int64), np.empty(2 * n)
-    kept = np.empty(max(0, np.max(shared[:, 2])))
+    # Both stages of a state together, the last state first: parts' own states, which few others see, so that
+    # elimination fills in least.
+    pivots, both, after = np.empty(2 * n, dtype=np.int64), np.empty((2 * n, k)), np.empty((n, k))
     call_system(address, times[0], states[0], integers, reals, scratch, 1, f, at_start, dfdt)
     if fresh:
-        _pushes(
-            address, times[0], states[0], f, lists, others, shared, scratch, kept, other, at_mid, dfdt, slopes
-        )
-        for b in range(k):
-            for i in range(n):
-                for j in range(n):
-                    slopes[b, i] += at_start[i, j] * near[b, j]
+        _pushes(address, times[0], states[0], f, lists, others, shared, scratch, other, at_mid, dfdt, slopes)
+        _add_product(at_start, near, slopes)
     sample = 0
     for step in range(count):
         length = times[step + 1] - times[step]
@@ -160,52 +165,53 @@ def follow(  # type: ignore[no-untyped-def]
             t1 = times[step + 1] if arrives else times[step] + (done + part) * length
             h = part * length
             t_mid = t0 + _NODE * h
-            _inside(states, pieces, step, done + _NODE * part, between)
-            call_system(address, t_mid, between, integers, reals, scratch, 1, mid, at_mid, dfdt)
-            _pushes(
-                address, t_mid, between, mid, lists, others, shared, scratch, kept, other, matrix, dfdt,
-                push_mid,
-            )  # fmt: skip
-            _inside(states, pieces, step, done + part, between)
-            call_system(address, t1, between, integers, reals, scratch, 1, end, at_end, dfdt)
+            _inside(states, pieces, step, done + _NODE * part, y_mid)
+            call_system(address, t_mid, y_mid, integers, reals, mid_scratch, 1, mid, at_mid, dfdt)
+            _inside(states, pieces, step, done + part, y_end)
+            call_system(address, t1, y_end, integers, reals, scratch, 1, end, at_end, dfdt)
             if part > _SMALLEST_PART and _cornered(h, at_start, at_mid, at_end, near, sizes, matrix):
                 part *= 0.5
                 continue
             _pushes(
-                address, t1, between, end, lists, others, shared, scratch, kept, other, matrix, dfdt, push_end
+                address, t_mid, y_mid, mid, lists, others, shared, mid_scratch, other, matrix, dfdt, push_mid
             )
+            _pushes(address, t1, y_end, end, lists, others, shared, scratch, other, matrix, dfdt, push_end)
             for i in range(n):
+                at = 2 * (n - 1 - i)
                 for j in range(n):
+                    of = 2 * (n - 1 - j)
                     same = 1.0 if i == j else 0.0
-                    matrix[i, j] = same - h * _A11 * at_mid[i, j]
-                    matrix[i, n + j] = -h * _A12 * at_end[i, j]
-                    matrix[n + i, j] = -h * _A21 * at_mid[i, j]
-                    matrix[n + i, n + j] = same - h * _A22 * at_end[i, j]
+                    matrix[at, of] = same - h * _A11 * at_mid[i, j]
+                    matrix[at, of + 1] = -h * _A12 * at_end[i, j]
+                    matrix[at + 1, of] = -h * _A21 * at_mid[i, j]
+                    matrix[at + 1, of + 1] = same - h * _A22 * at_end[i, j]
             factorise(matrix, inverse, pivots, 2 * n)
             last = sample
             while last < len(t_eval) and t_eval[last] <= t1:
                 last += 1
-            for b in range(k):
-                for i in range(n):
-                    both[i] = near[b, i] + h * (_A11 * push_mid[b, i] + _A12 * push_end[b, i])
-                    both[n + i] = near[b, i] + h * (_A21 * push_mid[b, i] + _A22 * push_end[b, i])
-                solve(matrix, inverse, pivots, 2 * n, at_mid, 2 * n, 0.0, both)
-                for i in range(n):
-                    slope = push_end[b, i]
-                    for j in range(n):
-                        slope += at_end[i, j] * both[n + j]
-                    before, after = near[b, i], both[n + i]
-                    first, second = h * slopes[b, i], h * slope
-                    for m in range(sample, last):
-                        s = (t_eval[m] - t0) / h
-                        r = 1.0 - s
+            for i in range(n):
+                at = 2 * (n - 1 - i)
+                for b in range(k):
+                    both[at, b] = near[i, b] + h * (_A11 * push_mid[i, b] + _A12 * push_end[i, b])
+                    both[at + 1, b] = near[i, b] + h * (_A21 * push_mid[i, b] + _A22 * push_end[i, b])
+            solve_all(matrix, inverse, pivots, 2 * n, both)
+            for i in range(n):
+                after[i] = both[2 * (n - 1 - i) + 1]
+            _add_product(at_end, after, push_end)
+            for m in range(sample, last):
+                s = (t_eval[m] - t0) / h
+                r = 1.0 - s
+                for b in range(k):
+                    for i in range(n):
                         out[b, m, i] = (
-                            before * r * r * (1.0 + 2.0 * s)
-                            + after * s * s * (1.0 + 2.0 * r)
-                            + r * s * (r * first - s * second)
+                            near[i, b] * r * r * (1.0 + 2.0 * s)
+                            + after[i, b] * s * s * (1.0 + 2.0 * r)
+                            + r * s * h * (r * slopes[i, b] - s * push_end[i, b])
                         )
-                    near[b, i], slopes[b, i] = after, slope
-                    sizes[b, i] = max(sizes[b, i], abs(after))
+            for i in range(n):
+                for b in range(k):
+                    near[i, b], slopes[i, b] = after[i, b], push_end[i, b]
+                    sizes[i, b] = max(sizes[i, b], abs(after[i, b]))
             sample = last
             at_start, at_end = at_end, at_start
             done += part

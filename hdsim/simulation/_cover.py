@@ -66,8 +66,8 @@ def cover(  # type: ignore[no-untyped-def]
     to the span before. ``inside_at`` is the place in the reals of a time inside the current span, or -1. The
     state ``guarded`` (-1: none) may not grow beyond ``limit``. ``progress`` (2,) counts spans and samples and
     starts with zeros. After so many ``blocks`` of steps control goes back to Python, which hears of Ctrl-C.
-    Of models beside this one ``others`` (k, reals) holds the reals; ``lists``, ``shared``, ``near`` (k, n),
-    ``slopes``, ``sizes`` (k, n) and the samples ``beside`` (k, m, n) are those of ``_beside.follow``.
+    Of models beside this one ``others`` (k, reals) holds the reals; ``lists``, ``shared``, ``near`` (n, k),
+    ``slopes``, ``sizes`` (n, k) and the samples ``beside`` (k, m, n) are those of ``_beside.follow``.
 
     Returns RUNNING: call again; else what ``advance`` returned, NOT_FINITE_STATE or RUNAWAY.
     """

@@ -54,3 +54,28 @@ def solve(matrix, inverse, pivots, core, jacobian, size, step_gamma, b):  # type
         for j in range(core):
             value += jacobian[i, j] * b[j]
         b[i] = value * step_gamma
+
+
+@_jit
+def solve_all(matrix, inverse, pivots, size, b):  # type: ignore[no-untyped-def]
+    """Solve A x = b in place for every column of ``b`` (size, k), A as ``factorise`` left it."""
+    columns = b.shape[1]
+    for k in range(size):
+        row = pivots[k]
+        if row != k:
+            for c in range(columns):
+                b[k, c], b[row, c] = b[row, c], b[k, c]
+    for k in range(size - 1):
+        for i in range(k + 1, size):
+            factor = matrix[i, k]
+            if factor != 0.0:
+                for c in range(columns):
+                    b[i, c] -= factor * b[k, c]
+    for k in range(size - 1, -1, -1):
+        for c in range(columns):
+            b[k, c] *= inverse[k]
+        for i in range(k):
+            factor = matrix[i, k]
+            if factor != 0.0:
+                for c in range(columns):
+                    b[i, c] -= factor * b[k, c]

@@ -41,13 +41,13 @@ class Beside:
         reals: their numbers, shape (k, reals); a run changes those that say where it is.
         y0: their initial states, shape (k, n).
         integers: theirs, shape (k, integers).
-        shared: what each takes from the model instead of computing it, shape (k, 3); see ``_beside.follow``.
+        shared: whether each takes from the scratch what the model has computed there, shape (k,).
     """
 
     reals: Array
     y0: Array
     integers: NDArray[np.int64]
-    shared: NDArray[np.int64]
+    shared: NDArray[np.bool_]
 
 
 class _Block:
@@ -108,8 +108,8 @@ class _Block:
         Returns status, samples (m, n), their number, and differences of the others' samples (k, m, n).
         """
         out = np.full((len(t_eval), len(self.y)), np.nan)
-        near = others.y0 - self.y
-        beside = np.full((len(near), *out.shape), np.nan)
+        near = np.ascontiguousarray((others.y0 - self.y).T)
+        beside = np.full((len(others.y0), *out.shape), np.nan)
         slopes, sizes = np.zeros_like(near), np.abs(near)
         progress = np.zeros(2, dtype=np.int64)
         status = compiled.RUNNING
@@ -305,8 +305,9 @@ def rodas4_through(
         empty = np.empty((0, len(t_eval)))
         return Integration(t_eval, empty, float(cuts[-1]), y0, None, True, "", beside=nothing)
     if others is None:
-        none = np.zeros((0, 3), dtype=np.int64)
-        others = Beside(np.zeros((0, len(system.reals))), np.zeros((0, system.size)), none, none)
+        lists = np.zeros((0, len(system.integers)), dtype=np.int64)
+        reals, none = np.zeros((0, len(system.reals))), np.zeros((0, system.size))
+        others = Beside(reals, none, lists, np.zeros(0, dtype=np.bool_))
     block = _Block(system, float(cuts[0]), y0, float(cuts[1]), rtol, atol, first_step, max_step, 64, stops)
     status, samples, count, beside = block.cover(cuts, inside_at, guard, t_eval, others)
     t = float(block.control[compiled.T])

@@ -155,30 +155,29 @@ def alike(model: Model, other: Model, end_s: float) -> bool:
 
 
 def _beside(model: Model, others: Sequence[Model]) -> Beside:
-    """Numbers of the models beside one, each with the mesh's result as given where the mesh is the same.
+    """Numbers of the models beside one, and which of them share all but their elements and inertias with it.
 
-    The mesh, the dearest part where it has teeth, sees the angles, its own numbers and the kinematic error
-    alone: a model with another inertia, friction or gain need not compute it again.
+    Coordinates, kinematic error and mesh, the dearest part where it has teeth, see the angles, signals and
+    their own numbers alone: a model with another inertia, friction or gain need not compute them again.
     """
-    from hdsim.drive import _mesh_layout
-    from hdsim.drive._mesh import given_mesh
     from hdsim.simulation.rosenbrock import Beside
 
     system = model.system
     reals = np.stack([other.system.reals for other in others])
     integers = np.stack([other.system.integers for other in others])
-    at = int(system.integers[layout.MESH_AT])
-    shared = np.tile([layout.S_MESH, -1, _mesh_layout.RESULT_SIZE], (len(others), 1))
     if not model.rigid:
         seen = np.ones(len(system.reals), dtype=bool)
         seen[layout.INSIDE : layout.INERTIA + 3] = seen[layout.HOUSING_INERTIA] = False
         # The elements' numbers come first; twists', signals' and the mesh's own follow.
         lists = system.integers[layout.LISTS + layout.PER_ELEMENT * system.integers[layout.ELEMENTS] :]
-        seen[layout.PARAMETERS : min([at, *lists[1::2]])] = False
-        same = (reals[:, seen] == system.reals[seen]).all(axis=1)
-        shared[same, 1] = at
-        integers[same, layout.MESH_ADDRESS] = given_mesh.address
-    return Beside(reals, np.stack([other.system.y0 for other in others]), integers, shared)
+        seen[layout.PARAMETERS : min([int(system.integers[layout.MESH_AT]), *lists[1::2]])] = False
+        integers[:, layout.GIVEN] = (reals[:, seen] == system.reals[seen]).all(axis=1)
+    return Beside(
+        reals,
+        np.stack([other.system.y0 for other in others]),
+        integers,
+        integers[:, layout.GIVEN] != 0,
+    )
 
 
 def _reaching_back(times: Array, memory_s: float) -> Array:

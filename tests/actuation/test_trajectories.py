@@ -380,6 +380,30 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, message):
         torque(type="recorded", file=str(write(tmp_path, text)))
 
 
+def test_signals_of_the_same_numbers_share_what_is_made_of_them():
+    wave = {"amplitude_deg": 10, "frequency_hz": 2}
+    one, same = angle(type="sine", **wave), angle(type="sine", **wave)
+    assert same.data is one.data
+    assert angle(type="sine", amplitude_rad=one.si.amplitude, frequency_hz=2).data is one.data
+    assert angle(type="sine", amplitude_deg=10.000001, frequency_hz=2).data is not one.data
+    assert angle(type="triangle", **wave).data is not one.data
+    moves = [
+        angle(type="sequence", moves=[{"type": kind, **wave, "cycles": 2}]) for kind in ("sine", "triangle")
+    ]
+    times = np.linspace(0.0, 1.0, 101)
+    assert not np.allclose(moves[0].values(times)[0], moves[1].values(times)[0])
+
+
+def test_a_file_that_has_changed_is_another_signal(tmp_path):
+    path = write(tmp_path, "time,value\n0,0\n1,180\n")
+    fields = {"type": "recorded", "file": str(path), "value_unit": "deg"}
+    for build in (lambda: angle(**fields), lambda: angle(type="sequence", moves=[fields])):
+        write(tmp_path, "time,value\n0,0\n1,180\n")
+        before = build().values([0.5])[0, 0]
+        write(tmp_path, "time,value\n0,0\n1,90\n")
+        assert build().values([0.5])[0, 0] == pytest.approx(0.5 * before)
+
+
 def test_a_missing_or_binary_file_is_refused(tmp_path):
     from hdsim.actuation.recorded import read_columns
 

@@ -13,7 +13,8 @@ from scipy.linalg import eigh, expm
 from hdsim.actuation.shapes import Hold
 from hdsim.actuation.signal_data import SignalData
 from hdsim.actuation.waves import Sine
-from hdsim.drive.model import Model
+from hdsim.drive import _layout as layout
+from hdsim.drive.model import COORDINATES, Model
 from hdsim.drive.parameters import Drive
 from hdsim.effects.base_flexibility import BaseFlexibility
 from hdsim.effects.kinematic_error import KinematicError
@@ -184,6 +185,26 @@ def test_derivatives_with_a_moving_housing_are_exact(mesh: str, prescribed: bool
             for h in (1e-5, 1e-6, 1e-7)
         ]
         assert min(errors) < 1e-5
+
+
+@pytest.mark.parametrize("arrangement", ["circular_spline_fixed", "flexspline_fixed"])
+@pytest.mark.parametrize("mesh", [mesh for mesh in MESHES if mesh != "rigid"])
+def test_turning_everything_bends_the_mount_alone(mesh: str, arrangement: str) -> None:
+    model = moving(mesh, arrangement, prescribed=False)
+    system = model.system
+    y = system.y0 + 0.3 * system.scale * np.random.default_rng(6).normal(size=system.size)
+    _, jacobian, _ = system.evaluate(0.5, y)
+    # All angles by the same: ring and output are states as deviations from the ideal gear.
+    turned = np.zeros(system.size)
+    for name, at in model.place_of.items():
+        turned[at] = 1.0 - (0.0 if name == "motor" else system.reals[layout.LAMBDA + COORDINATES.index(name)])
+    housing = [state.name for state in model.states].index("housing_angle")
+    first = system.size - system.quadratures - len(model.states)
+    turned[first + housing] = 1.0
+    row = jacobian[first + housing + 1]
+    assert MOUNT.inertia_kg_m2 is not None
+    wanted = -MOUNT.stiffness_nm_per_rad / MOUNT.inertia_kg_m2
+    assert row @ turned == pytest.approx(wanted, abs=1e-12 * np.max(np.abs(row)), rel=1e-10)
 
 
 def test_a_housing_has_one_inertia_and_a_model_one_housing() -> None:

@@ -1,6 +1,7 @@
 """Models that are linearised beside one that is simulated: against formulas and against runs of their own."""
 
 import cmath
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,9 +9,11 @@ import pytest
 from hdsim.actuation.shapes import Hold, Ramp
 from hdsim.actuation.signal_data import SignalData
 from hdsim.actuation.waves import Sine
+from hdsim.drive import _layout as layout
 from hdsim.drive.model import Model
 from hdsim.scenario import Scenario
-from hdsim.simulation.sample import alike, sample, samples_beside
+from hdsim.simulation.rosenbrock import rodas4_through
+from hdsim.simulation.sample import _beside, alike, sample, samples_beside
 
 STIFFNESS, DAMPING, INERTIA, TORQUE = 2e4, 6.0, 0.5, 10.0
 TIMES = np.arange(0.0, 0.6, 1e-3)
@@ -134,3 +137,31 @@ def test_the_model_itself_is_what_it_is_alone():
     for channel in CHANNELS:
         assert np.array_equal(alone[channel], here[channel])
         assert np.allclose(near[channel], here[channel], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("mesh", ["lumped", "teeth"])
+def test_what_is_taken_from_the_model_is_what_it_would_be_computed_anew(mesh):
+    swing = SignalData(Sine(amplitude=40.0, frequency_hz=1.5).move())
+
+    def at(part, amplitude=0.5):
+        effects = {"kinematic_error": {"components": [{"order": 2, "amplitude_arcmin": amplitude}]}}
+        torsion = {"damping_nm_s_per_rad": DAMPING * part}
+        drive = {"preset": "seed-2021", "mesh": {"model": mesh}, "torsion": torsion}
+        return model_of(drive, effects, motion=swing)
+
+    # Between two that take from the scratch one that fills it with its own.
+    one, others = at(1.0), [at(1.0 + STEP), at(1.0, 0.5 * (1.0 + STEP)), at(1.0 - STEP)]
+    given = _beside(one, others)
+    assert given.shared.tolist() == [True, False, True]
+    anew = replace(given, integers=given.integers.copy(), shared=np.zeros(3, dtype=np.bool_))
+    anew.integers[:, layout.GIVEN] = 0
+    system, times = one.system, TIMES[:100]
+    near = []
+    for beside in (given, anew):
+        beside.reals[:, layout.INSIDE] = system.reals[layout.INSIDE] = 0.05
+        found = rodas4_through(
+            system, times[[0, -1]], system.y0, times, rtol=1e-6, atol=1e-6 * system.scale, others=beside
+        )
+        near.append(found.beside)
+    assert np.max(np.abs(near[0])) > 0.0
+    np.testing.assert_array_equal(near[0], near[1])
