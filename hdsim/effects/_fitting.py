@@ -270,9 +270,24 @@ class Fitting:
         for term, part in self.parts(orders):
             items = len(self.items(term.list_path)) if term.list_path else 0
             term.report(found, coefficients[part], covariance[part, part], orders, items)
+        for path, units in self._sums(orders).items():
+            # What is unsure of a term that others are on top of is unsure of them too.
+            value = sum(unit * coefficients[k] for k, unit in units.items())
+            variance = sum(a * b * covariance[i, j] for i, a in units.items() for j, b in units.items())
+            half = 2.0 * math.sqrt(max(float(variance), 0.0))
+            found[path] = Ranged(value, value - half, value + half)
         for shape, value, deviation in zip(self.shapes, shapes, deviations, strict=True):
             found[shape.path] = shape.report(value, float(deviation))
         return found
+
+    def _sums(self, orders: Sequence[float]) -> dict[str, dict[int, float]]:
+        """Fields that several terms add to, each with the units of its coefficients by their place."""
+        units: dict[str, dict[int, float]] = {}
+        for term, part in self.parts(orders):
+            if isinstance(term, Amplitude):
+                for path, unit in term.units.items():
+                    units.setdefault(path, {})[part.start] = unit
+        return {path: own for path, own in units.items() if len(own) > 1}
 
     @property
     def paths(self) -> tuple[str, ...]:

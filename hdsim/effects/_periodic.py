@@ -58,10 +58,14 @@ class Periodic(Term):
         return self.section
 
     def orders_among(self, lines: Iterable[tuple[str, float]], most: int) -> tuple[float, ...] | None:
-        """Of its channel, one a turn or more, but for those that other terms have."""
+        """Of its channel, one a turn or more, but for those that other terms have.
+
+        Beyond the strongest only whole ones: what wobbles or rings has any number of others.
+        """
         own = [order for channel, order in lines if channel == self.channel and order >= 1.0]
         own = [order for order in own if not any(abs(order - other) < 0.05 for other in self.besides)]
-        return tuple(own[:most]) if own or self.besides else None
+        own = [*own[:most], *(order for order in own[most:] if order == round(order))]
+        return tuple(own) if own or self.besides else None
 
     def harmonic(self, item: int) -> Harmonic:
         """The harmonic that an item of the list is."""

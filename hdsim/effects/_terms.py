@@ -98,7 +98,7 @@ class Term:
 
         Args:
             lines: channel and order of each peak, the largest first.
-            most: number of orders.
+            most: number of orders; beyond them whole ones only, if any.
         """
         return ()
 
@@ -173,14 +173,10 @@ class Amplitude(Term):
         return replace(self.rescaled(ranges[self.of_range]), of_range="") if self.of_range else self
 
     def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
-        """Each field; one of several terms has their sum, with this one's spread."""
+        """Each field; what several terms add to one is the fitting's (``Fitting.report``)."""
         half = 2.0 * math.sqrt(max(float(covariance[0, 0]), 0.0))
+        low = c[0] - half if self.signed else max(c[0] - half, 0.0)
         for path, unit in self.units.items():
-            if path in found:
-                value = found[path].value + unit * c[0]
-                found[path] = Ranged(value, value - unit * half, value + unit * half)
-                continue
-            low = c[0] - half if self.signed else max(c[0] - half, 0.0)
             found[path] = Ranged(unit * c[0], unit * low, unit * (c[0] + half))
 
 

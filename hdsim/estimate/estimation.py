@@ -15,7 +15,8 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.determine import UNDETERMINED
-from hdsim.estimate.fit import Fit
+from hdsim.estimate.drift import drifted
+from hdsim.estimate.fit import Fit, base_intervals
 from hdsim.estimate.found import Gap, ShortCut
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, undeclared
 from hdsim.estimate.offsets import Zeros
@@ -26,6 +27,7 @@ from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit
+from hdsim.estimate.repeat import with_repeats
 from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
@@ -166,10 +168,13 @@ def estimate(
     except PredictionError as error:
         said = ", ".join(record.name for record in records)
         raise InputError(f"{said}: the model cannot follow the measured motion: {error}") from None
+    found.fit = drifted(bench, found.fit)
+    found.intervals = base_intervals(found.fit, found.freedoms)
     tell("validating on held-out data")
     states = {"before": start, "refit": found.fit.state, "after": found.fit.state}
     gap, predictions = gaps(bench, states)
     gap = with_baselines(bench, start, gap, black_box=black_box)
+    gap = with_repeats(bench, found.fit.state, gap, predictions["after"])
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
     problems += [*beginnings(bench), *one_way(bench), *moving_zeros(bench, found.fit.predictions)]

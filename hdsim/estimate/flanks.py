@@ -2,7 +2,8 @@
 
 A mesh with teeth draws each tooth's half-gap and pitch error (``hdsim.surface``), and the drive that was
 measured has drawn its own. So a prediction is known up to what another draw changes, and what is no larger
-is no effect.
+is no effect. Intervals hold the engagement as well, by the prior spreads of its fields: how many teeth carry
+the load stands in no catalogue.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from hdsim.drive.parameters import ToothedMesh
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
+from hdsim.estimate.numbers import scaled, undeclared
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
@@ -30,8 +32,13 @@ if TYPE_CHECKING:
 DRAWS, SPARE = 8, 1.5
 
 
-def drawn_anew(state: State) -> list[State]:
-    """The model with other flanks; none where nothing of its teeth is drawn."""
+def drawn_anew(state: State, *, engaged: bool = False) -> list[State]:
+    """The model with other flanks; none where nothing of its teeth is drawn.
+
+    Args:
+        state: the model.
+        engaged: draw the engagement's numbers from their priors, too.
+    """
     mesh = state.drive.mesh
     if not isinstance(mesh, ToothedMesh):
         return []
@@ -39,8 +46,18 @@ def drawn_anew(state: State) -> list[State]:
         return []
     flanks = mesh.flanks.model_copy(update={"seed": None})
     drive = state.drive.model_copy(update={"mesh": mesh.model_copy(update={"flanks": flanks})})
-    seeds = np.random.default_rng([state.seed, 31]).integers(2**31, size=DRAWS)
-    return [replace(state, drive=drive, seed=int(seed)) for seed in seeds]
+    rng = np.random.default_rng([state.seed, 31])
+    others = [replace(state, drive=drive, seed=int(seed)) for seed in rng.integers(2**31, size=DRAWS)]
+    return [_engaged(other, rng) for other in others] if engaged else others
+
+
+def _engaged(state: State, rng: np.random.Generator) -> State:
+    """The model with its engagement's numbers drawn from their priors, within what their fields allow."""
+    section = "drive.mesh.engagement"
+    paths = [f"{section}.{name}" for name in type(state.drive.mesh.engagement).model_fields]
+    frees = [free for path in paths if (free := undeclared(state, path, 0.0)) and free.prior > 0]
+    thetas = [float(np.clip(free.prior * rng.standard_normal(), *free.bounds)) for free in frees]
+    return scaled(state, frees, thetas)
 
 
 def hear_flanks(bench: Bench, state: State) -> None:
@@ -56,11 +73,11 @@ def hear_flanks(bench: Bench, state: State) -> None:
     others = drawn_anew(state)
     if not others:
         return
-    with bench.coarse():
-        try:
-            bench.redrawn = [bench.predict(one, everything=True) for one in [state, *others]]
-        except PredictionError:
-            return
+    predicted = _predicted(bench, [state, *others], everything=True)
+    bench.redrawn = [one for one in predicted if one is not None]
+    if predicted[0] is None or len(bench.redrawn) < 2:
+        bench.redrawn = []
+        return
     own, *there = bench.redrawn
     left: dict[str, float] = {}
     for series, rest in zip(bench.series, bench.residuals(own), strict=True):
@@ -83,17 +100,36 @@ def only_flanks(bench: Bench, power: float, project: Callable[[Array], Array]) -
     return bool(bench.redrawn) and power < of_other_flanks(bench, project)
 
 
-def of_other_flanks(bench: Bench, project: Callable[[Array], Array]) -> float:
+def nothing_but_flanks(bench: Bench, power: float, project: Callable[[Array], Array]) -> bool:
+    """Whether a whitened power beyond the noise, the most that an effect could explain, is only flanks'.
+
+    Where it lies is not asked: what a wider gap leaves is no curve over one coordinate.
+    """
+    return only_flanks(bench, power - sum(bench.noise_powers.values()), project)
+
+
+def of_other_flanks(
+    bench: Bench, project: Callable[[Array], Array], traces: Sequence[Array] | None = None
+) -> float:
     """Whitened power beyond which a change is more than other flanks do; 0 where none are drawn.
 
     Args:
         bench: the measured series.
         project: takes out what the model's own numbers explain.
+        traces: of all effects that are searched, shape (rows, k) each: only what the one that explains most
+            takes for its own counts. What a search finds in other flanks is that, and no effect explains all.
     """
     if not bench.redrawn:
         return 0.0
     own, *there = bench.redrawn
-    return SPARE * max(float(np.sum(project(bench.trace(own, one)) ** 2)) for one in there)
+    changes = project(np.column_stack([bench.trace(own, one) for one in there]))
+    if traces is None:
+        return SPARE * float(np.max(np.sum(changes**2, axis=0)))
+    found = 0.0
+    for columns in traces:
+        along, _ = np.linalg.qr(project(columns))
+        found = max(found, float(np.max(np.sum((along.T @ changes) ** 2, axis=0))))
+    return SPARE * found
 
 
 def led_by(bench: Bench, found: Fit, columns: Array) -> Array:
@@ -124,22 +160,39 @@ def other_drives(bench: Bench, found: Fit, others: Sequence[State], own: State |
         own: the model that they are held against, where that is not the fit's.
 
     Returns:
-        None where one of them cannot be predicted.
+        A row of nan for one that cannot be predicted (its teeth alone may be softer than the whole drive is
+        known to be); None where that is so of all, or of the model itself.
     """
+    here, *there = _predicted(bench, [own or found.state, *others])
+    known = [k for k, one in enumerate(there) if one is not None]
+    if here is None or not known:
+        return None
+    changes = [bench.trace(here, one) for one in there if one is not None]
+    moves = np.full((len(others), found.columns.shape[1]), np.nan)
+    moves[known] = led_by(bench, found, np.column_stack(changes))
+    return moves
+
+
+def _predicted(
+    bench: Bench, states: Sequence[State], *, everything: bool = False
+) -> list[list[Array] | None]:
+    """What each model predicts with the tolerance of a search; None where it cannot be."""
+    predicted: list[list[Array] | None] = []
     with bench.coarse():
-        try:
-            here, *there = [bench.predict(one) for one in [own or found.state, *others]]
-        except PredictionError:
-            return None
-    return led_by(bench, found, np.column_stack([bench.trace(here, one) for one in there]))
+        for state in states:
+            try:
+                predicted.append(bench.predict(state, everything=everything))
+            except PredictionError:
+                predicted.append(None)
+    return predicted
 
 
 def widen_by_flanks(bench: Bench, found: Fit) -> None:
-    """Let the spread of a fit's numbers over other flanks widen their intervals.
+    """Let the spread of a fit's numbers over other flanks and engagements widen their intervals.
 
-    Other flanks move a number by as much in all blocks of time, so what is left does not show it.
+    They move a number by as much in all blocks of time, so what is left does not show it.
     """
-    others = drawn_anew(found.state)
+    others = drawn_anew(found.state, engaged=True)
     if not others or not found.columns.size:
         return
     moves = other_drives(bench, found, others)
@@ -151,8 +204,9 @@ def spread_of_draws(moves: Array) -> Array:
     """Covariance of numbers over other draws, whose double square root is a 95 % interval, shape (p, p).
 
     Args:
-        moves: of each draw from the model's own, shape (draws, p).
+        moves: of each draw from the model's own, shape (draws, p); rows of nan do not count.
     """
     from scipy.special import stdtrit
 
+    moves = moves[np.isfinite(moves).all(axis=1)]
     return np.asarray(moves.T @ moves / len(moves) * (stdtrit(len(moves), 0.975) / 2.0) ** 2)

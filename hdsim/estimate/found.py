@@ -42,8 +42,11 @@ class Gap(Part):
     """Of a linear regression of the same training samples (``hdsim/estimate/baseline.py``)."""
     black_box: float | None = None
     """Of gradient boosting after that regression, where it was asked for."""
+    repeats: float | None = None
+    """Share of the power of what ``after`` leaves, held out or not, that repeats from one turn of the wave
+    generator to the next (``hdsim/estimate/repeat.py``); None where too few turns are there."""
     unit: str
-    """Unit of all of them."""
+    """Unit of all residuals."""
     data: Literal["holdout"] = "holdout"
     """What they were computed on."""
     variation: float

@@ -88,3 +88,32 @@ def offset_columns(series: Sequence[Series], training: int, zeros: Zeros) -> Arr
             np.concatenate([np.full(sizes[k], least / series[k].sigma if k in group else 0.0) for k in seen])
         )
     return np.column_stack(columns) if columns else np.zeros((sum(sizes.values()), 0))
+
+
+def drift_columns(series: Sequence[Series], training: int, zeros: Zeros) -> tuple[Array, Array]:
+    """What a record's zero beside the common one of its channel does to the whitened training samples.
+
+    Args:
+        series: all of them.
+        training: number of the records that fits see.
+        zeros: which of them share one.
+
+    Returns:
+        Shape (rows, drifts), the common zero taken out, and what is believed of them before, (drifts,), SI
+        units: anything up to ``DRIFT`` of a single reading's noise is as likely.
+    """
+    seen = [k for k, one in enumerate(series) if one.record < training]
+    first = dict(zip(seen, np.cumsum([0, *(int(series[k].train.sum()) for k in seen)]), strict=False))
+    rows = sum(int(series[k].train.sum()) for k in seen)
+    columns, spreads = [], []
+    for group in groups(series, zeros):
+        own = [k for k in group if k in first and series[k].train.any() and series[k].reading > 0.0]
+        weights = np.array([series[k].train.sum() / series[k].sigma ** 2 for k in own])
+        for k, part in zip(own, weights / weights.sum(), strict=True) if len(own) > 1 else ():
+            column = np.zeros(rows)
+            for j in own:
+                count = int(series[j].train.sum())
+                column[first[j] : first[j] + count] = (float(j == k) - part) / series[j].sigma
+            columns.append(column)
+            spreads.append(DRIFT * series[k].reading / np.sqrt(3.0))
+    return np.column_stack(columns) if columns else np.zeros((rows, 0)), np.array(spreads)

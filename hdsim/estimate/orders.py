@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.predict import Predictor
 from hdsim.estimate.records import Array
 
 #: Order spectra: densely up to the first number, at integers up to the second.
@@ -31,12 +32,21 @@ class Line:
     share: float
 
 
-def order_lines(bench: Bench, residuals: Sequence[Array], channel: str, most: int = 6) -> list[Line]:
+def order_lines(
+    bench: Bench, residuals: Sequence[Array], channel: str, most: int = 6, *, age_s: float = 0.0
+) -> list[Line]:
     """Strongest orders per wave-generator turn in a channel's residual.
 
     The amplitude at an order is the least-squares one over the measured angle, so the speed may vary.
+
+    Args:
+        bench: the measured series.
+        residuals: of every series, SI units.
+        channel: its name.
+        most: lines.
+        age_s: how late the channel is read beside the motion: without it high orders are blurred.
     """
-    over = over_angle(bench, residuals, channel)
+    over = over_angle(bench, residuals, channel, age_s)
     if over is None:
         return []
     theta, e, turns, highest = over.angle, over.value, over.turns, over.highest
@@ -94,15 +104,25 @@ class OverAngle:
     period_s: float
 
 
-def over_angle(bench: Bench, residuals: Sequence[Array], channel: str) -> OverAngle | None:
-    """The training samples of a channel; None where no order makes a period, or without anything left."""
+def over_angle(
+    bench: Bench, residuals: Sequence[Array], channel: str, age_s: float = 0.0
+) -> OverAngle | None:
+    """The training samples of a channel; None where no order makes a period, or without anything left.
+
+    Args:
+        bench: the measured series.
+        residuals: of every series, SI units.
+        channel: its name.
+        age_s: how late it is read beside the motion; the angle is the one that its reading is of.
+    """
     parts: list[tuple[Array, Array, Array]] = []
     fastest = turns = period = 0.0
     for series, residual in zip(bench.series, residuals, strict=True):
         if series.channel != channel or not len(residual) or not series.train.any():
             continue
         predictor, seen = bench.predictors[series.record], series.train
-        parts.append((predictor.motor_angle[seen], predictor.motor_velocity[seen], residual[seen]))
+        angle = angle_read(predictor, age_s)
+        parts.append((angle[seen], predictor.motor_velocity[seen], residual[seen]))
         turns = max(turns, float(np.ptp(parts[-1][0])) / (2 * np.pi))
         fastest = max(fastest, float(np.quantile(np.abs(predictor.motor_velocity), 0.5)) / (2 * np.pi))
         period = max(period, predictor.record.period_s)
@@ -121,6 +141,11 @@ def over_angle(bench: Bench, residuals: Sequence[Array], channel: str) -> OverAn
     return OverAngle(angle, velocity, value, turns, lowest, highest, period)
 
 
+def angle_read(predictor: Predictor, age_s: float) -> Array:
+    """Motor angle that the readings of a channel are of, which are so late beside the motion: shape (n,)."""
+    return np.asarray(predictor.motor_angle - age_s * predictor.motor_velocity)
+
+
 def _refined(theta: Array, e: Array, order: float, step: float) -> float:
     """The order within one step of ``order`` whose line is strongest."""
     fine = order + step * np.linspace(-1.0, 1.0, 21)
@@ -128,13 +153,16 @@ def _refined(theta: Array, e: Array, order: float, step: float) -> float:
     return float(fine[int(np.argmax(power))])
 
 
-def power_of(bench: Bench, residuals: Sequence[Array], lines: Sequence[Line]) -> float:
+def power_of(
+    bench: Bench, residuals: Sequence[Array], lines: Sequence[Line], ages_s: Mapping[str, float]
+) -> float:
     """Whitened power that least squares finds at the orders of some lines in their channels' residuals.
 
     Args:
         bench: the measured series.
         residuals: of every series, SI units.
         lines: peaks of order spectra.
+        ages_s: how late channels are read beside the motion.
     """
     total = 0.0
     for series, residual in zip(bench.series, residuals, strict=True):
@@ -142,7 +170,8 @@ def power_of(bench: Bench, residuals: Sequence[Array], lines: Sequence[Line]) ->
         if not orders or not len(residual) or not series.train.any():
             continue
         own = residual[series.train] / series.sigma
-        theta = bench.predictors[series.record].motor_angle[series.train]
+        age_s = ages_s.get(series.channel, 0.0)
+        theta = angle_read(bench.predictors[series.record], age_s)[series.train]
         left, _ = _without(theta, own - own.mean(), orders)
         total += float(np.sum((own - own.mean()) ** 2) - np.sum(left**2))
     return total

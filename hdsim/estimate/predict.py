@@ -25,6 +25,7 @@ from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_mean
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
+from hdsim.estimate.thin import Means
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
@@ -73,10 +74,12 @@ class Predictor:
         turns, self._zero = 0, 0.0
         if plan.motion == "motor_angle" and "output_angle" in record.readable and not plan.locked:
             turns, self._zero = between_zeros(record, ratio)
+        self._means = Means(record)
         #: The prescribed reading, shape (n,), counted from the motor's zero that is next to the output's.
-        values = self._reading = record.filled(plan.motion) + 2.0 * np.pi * turns
+        values = self._reading = self._means.behind(record.filled(plan.motion)) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
+        rate = None if rate is None else (self._means.behind(rate[0]), rate[1])
         spline, self._likeliest = spline_through(record.time, values, motion=moves, step=step, rate=rate)
         breaks, coefficients = pieces_of(spline)
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
@@ -92,7 +95,8 @@ class Predictor:
         self.load_torque: SignalData | None = None
         if plan.load != "scenario":
             step = self._step(plan.load)
-            breaks, coefficients = smoothed(record.time, record.filled(plan.load), step=step)
+            carried = self._means.behind(record.filled(plan.load))
+            breaks, coefficients = smoothed(record.time, carried, step=step)
             sign = -1.0 if plan.load == "output_torque" else 1.0
             self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
         #: What a part may ask for beside the motion (``Builder.external``).
@@ -197,7 +201,8 @@ class Predictor:
         beside = noises(read, good, step, values - motor / self.ratio, whole)
         if beside[0] >= plain[0]:
             return values, trusted, *plain
-        return values - (self._reading - self.motor_angle) / self.ratio, whole, *beside
+        own = self._means.of(self._reading - self.motor_angle)
+        return values - own / self.ratio, whole, *beside
 
     def predict(self, candidate: Candidate) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
@@ -260,10 +265,10 @@ class Predictor:
             got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol, atol=atol)
         except RunFailed as error:
             raise PredictionError(str(error)) from None
-        found = {c: got.get(f"measured_{c}", got[c]) for c in self.plan.channels}
+        found = {c: self._means.of(got.get(f"measured_{c}", got[c])) for c in self.plan.channels}
         if self._slow is not None:
             # Not compared, but it tells an effect that acts behind the sensor, where none can be seen.
-            found[CARRIED] = got["output_torque"]
+            found[CARRIED] = self._means.of(got["output_torque"])
             if "output_torque" in found:
                 # What the sensor adds, and of that what a slow load could not be.
                 own = found["output_torque"] - found[CARRIED]

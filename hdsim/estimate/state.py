@@ -63,6 +63,11 @@ class Added:
             for term, part in self.fitting.parts(self.orders)
         )
 
+    @property
+    def freedom(self) -> int:
+        """Free numbers; orders that are read from the data are, too."""
+        return len(self.coefficients) + len(self.shapes) + len(self.orders)
+
     def limits(self, path: str) -> tuple[float, float]:
         """Least and largest value that a field of the effect allows."""
         return number.limits(_metadata(self.effect, path))

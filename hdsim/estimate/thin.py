@@ -64,6 +64,38 @@ def thinned(record: Record, count: int) -> Record:
     )  # fmt: skip
 
 
+class Means:
+    """What means of successive readings do to a course that is smooth over each of them.
+
+    The mean over readings whose stamps have the variance v is f + v f''/2, to the second order of their span.
+
+    Args:
+        record: its samples may be means or readings; readings are left as they are.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self._half: Array | None = None
+        if record.readings > 1:
+            whole = len(record.time)
+            stamps = record.as_read.time[: whole * record.readings].reshape(whole, record.readings)
+            self._half, self._time = 0.5 * stamps.var(axis=1), record.time
+
+    def of(self, course: Array) -> Array:
+        """Means of a course that is given at the samples' times, shape (n,)."""
+        return course if self._half is None else course + self._lost(self._half, course)
+
+    def behind(self, means: Array) -> Array:
+        """The course at the samples' times of which these are the means, shape (n,)."""
+        return means if self._half is None else means - self._lost(self._half, means)
+
+    def _lost(self, half: Array, values: Array) -> Array:
+        """Half the variance times the second derivative, divided differences; none at the ends."""
+        apart = np.diff(self._time)
+        bend = np.zeros(len(values))
+        bend[1:-1] = 2.0 * np.diff(np.diff(values) / apart) / (apart[1:] + apart[:-1])
+        return np.asarray(half * bend)
+
+
 def readings_of_means(
     records: Sequence[Record],
     *,

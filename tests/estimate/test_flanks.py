@@ -1,12 +1,20 @@
 """What other flanks would do: heard as noise, no more than is left, and never for a mesh that draws none."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hdsim
-from hdsim.estimate.flanks import DRAWS, drawn_anew, hear_flanks, of_other_flanks, only_flanks
+from hdsim.estimate.flanks import (
+    DRAWS,
+    drawn_anew,
+    hear_flanks,
+    nothing_but_flanks,
+    of_other_flanks,
+    only_flanks,
+)
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
 from hdsim.estimate.state import State, state_of
@@ -61,6 +69,23 @@ def test_only_what_is_drawn_is_drawn_anew(mesh: dict[str, Any], draws: int) -> N
     assert all(one.drive.mesh.flanks.seed is None for one in others)
 
 
+def test_engagements_are_drawn_from_what_is_believed_of_them() -> None:
+    own = state({})
+    shares, edges = [], []
+    for seed in range(40):
+        plain, others = (drawn_anew(replace(own, seed=seed), engaged=engaged) for engaged in (False, True))
+        assert [one.seed for one in plain] == [one.seed for one in others]
+        assert {one.drive.mesh.engagement for one in plain} == {own.drive.mesh.engagement}
+        shares += [one.drive.mesh.engagement.share for one in others]
+        edges += [one.drive.mesh.engagement.edge_teeth for one in others]
+    engagement = own.drive.mesh.engagement
+    for drawn, nominal, prior in ((shares, engagement.share, 0.3), (edges, engagement.edge_teeth, 0.5)):
+        logs = np.log(np.array(drawn) / nominal)
+        assert abs(logs.mean()) < 3 * prior / np.sqrt(len(logs))
+        assert abs(logs.std() / prior - 1) < 0.15
+    assert max(shares) <= 0.9
+
+
 def test_a_drive_with_its_own_flanks_differs_by_what_other_flanks_do() -> None:
     base = scenario({})
     bench = bench_for([record(scenario({}, seed=77))], [], base, None)
@@ -85,7 +110,16 @@ def test_a_drive_with_its_own_flanks_differs_by_what_other_flanks_do() -> None:
     assert most > 0
     assert only_flanks(bench, 0.9 * most, as_it_is)
     assert not only_flanks(bench, 1.1 * most, as_it_is)
-    assert float(whitened @ whitened) < 1.5 * most, "another drive's flanks are no effect"
+    power = float(whitened @ whitened)
+    assert power < 1.5 * most, "another drive's flanks are no effect"
+    changes = [bench.trace(bench.redrawn[0], one) for one in bench.redrawn[1:]]
+    largest = max(changes, key=lambda change: float(change @ change))
+    other = np.random.default_rng(1).standard_normal((len(largest), 2))
+    assert of_other_flanks(bench, as_it_is, [other]) < 0.1 * most, "such a trace takes little of theirs"
+    assert of_other_flanks(bench, as_it_is, [other, largest[:, None]]) == pytest.approx(most)
+    noise = sum(bench.noise_powers.values())
+    assert nothing_but_flanks(bench, noise + 0.9 * most, as_it_is)
+    assert not nothing_but_flanks(bench, noise + 1.1 * most, as_it_is)
 
 
 def test_what_is_not_left_is_no_noise() -> None:
@@ -103,3 +137,4 @@ def test_what_is_not_left_is_no_noise() -> None:
     hear_flanks(bench, state_of(plain))
     assert bench.redrawn == []
     assert not only_flanks(bench, 0.0, lambda values: values)
+    assert not nothing_but_flanks(bench, 0.0, lambda values: values)

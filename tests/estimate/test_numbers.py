@@ -235,6 +235,16 @@ def test_terms_of_one_field_add_up():
     assert told["static_nm"] == pytest.approx((0.1002, 0.0802, 0.1202))
 
 
+def test_a_sum_is_as_unsure_as_all_of_its_terms():
+    (fitting,) = catalogue()["lugre_friction"].fittings
+    covariance = np.array([[0.25, -0.05], [-0.05, 0.04]])
+    told = fitting.report((2.0, 3.0), covariance, (5.0, 6.0), (0.0, 0.0), ())
+    drawn = np.random.default_rng(5).multivariate_normal([2.0, 3.0], covariance, 2000)
+    statics = [fitting.written(tuple(c), (5.0, 6.0), ())["static_nm"] for c in drawn if c[0] > 0 and c[1] > 0]
+    low, high = told["static_nm"][1:]
+    assert np.std(statics) == pytest.approx((high - low) / 4, rel=0.05)
+
+
 def test_a_field_declares_its_number():
     class Model(hdsim.parts.Parameters):
         moved_nm: Annotated[float, Number(0.3)] = Field(1.0, gt=0)

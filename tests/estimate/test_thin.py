@@ -9,7 +9,7 @@ import pytest
 from hdsim.estimate.noise import noise_of_means, quantisation_step
 from hdsim.estimate.predict import Predictor, plan_for
 from hdsim.estimate.records import Record
-from hdsim.estimate.thin import readings_of_means, thinned
+from hdsim.estimate.thin import Means, readings_of_means, thinned
 
 RATE = 5000.0
 
@@ -116,3 +116,26 @@ def test_means_keep_the_numbers_and_the_verdict(tmp_path):
     # The interval is mostly the torque's unknown gain, which no number of readings tells.
     value = picked.parameters["drive.friction.coulomb_nm"].value
     assert abs(number.value - value) < 0.05 * (high - low)
+
+
+def test_means_of_a_course_are_what_readings_of_it_average_to():
+    rng = np.random.default_rng(4)
+    time = (np.arange(16000) + rng.uniform(-0.2, 0.2, 16000)) / RATE
+
+    def ripple(at):
+        return np.sin(2 * np.pi * 40.0 * at + 3.0 * np.sin(2 * np.pi * 0.5 * at))
+
+    few = thinned(Record("ripple", time, {"motor_torque": ripple(time)}), 8)
+    course, means, inside = ripple(few.time + few.begins_s), few.channels["motor_torque"], slice(1, -1)
+    missed = (Means(few).of(course) - means)[inside]
+    assert np.std(course - means) > 4e-3
+    assert np.std(missed) < 0.05 * np.std(course - means)
+    back = (Means(few).behind(means) - course)[inside]
+    assert np.std(back) < 0.05 * np.std(course - means)
+
+
+def test_readings_are_left_as_they_are():
+    one = record(3.0)
+    values = one.channels["motor_torque"]
+    assert Means(one).of(values) is values
+    assert Means(one).behind(values) is values
