@@ -20,7 +20,7 @@ from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.search import Search, Stage, shown_in
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.flanks import only_flanks
+from hdsim.estimate.flanks import nothing_but_flanks, only_flanks
 from hdsim.estimate.found import Gap
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out
@@ -51,7 +51,7 @@ def collect(
     last = found.stages[-1].location
     explained = bench.power(base.fit.predictions) - bench.power(found.fit.predictions)
     left = last.structured * found.left.power
-    flanks = only_flanks(bench, left, found.left.project)
+    project = found.left.project
     shown = shown_in(bench, found.fit)
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
@@ -68,9 +68,11 @@ def collect(
         ],
         explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
         left=last.structured,
-        left_chance=1.0 if flanks else last.chance,
+        left_chance=1.0 if only_flanks(bench, left, project) else last.chance,
         held=_held(bench, predictions) if found.named else HeldOutEvidence(),
-        rest=_rest(bench, found.fit.predictions),
+        rest=None
+        if nothing_but_flanks(bench, found.left.power, project)
+        else _rest(bench, found.fit.predictions),
         fell=max((1.0 - g.refit / g.before for g in gap.values() if g.before > 0), default=0.0),
         moved=[i.name for i in base.moved],
     )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.coordinates import hats
 from hdsim.diagnosis.curve_fit import FINE, effect, solved, unit_of, unit_traces
 from hdsim.diagnosis.curve_kinds import PLACES, Kind, kinds, sign_of, values_of
@@ -19,7 +20,6 @@ from hdsim.diagnosis.further import CurveFound
 from hdsim.diagnosis.locate import Location
 from hdsim.diagnosis.penalised import Penalised, penalised, roughness
 from hdsim.diagnosis.screen import Residual
-from hdsim.diagnosis.search import left_of
 from hdsim.effects.table import COORDINATE_UNITS
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit

@@ -1,12 +1,10 @@
 """Whether an order of what is left grows with speed, which it does where something is shaken, or does not.
 
-Order tracking (Vold and Leuridan 1993, SAE 931288, for the idea): one complex amplitude of each period of the
-order, from a Hann window over two of them in the angle, which knows no constant and hardly a slope. Their
-means over bands of speed in each record, with intervals from their scatter, are compared with a power of the
-speed: of exponent 0 is what is cut into teeth, scales and magnets, of 2 what inertia makes of such an error
-(T = J e'' = J k^2 w^2 e). What passes a resonance goes as 1 or r^2 over |1 - r^2 + 2 i d r|, with r the speed
-over that of the resonance (den Hartog, Mechanical Vibrations, ch. 2: a constant force, and a shaken base),
-where that is better by an F test.
+Order tracking (``tracking.py``) gives an order's mean amplitude in bands of speed, with intervals from its
+scatter. They are compared with a power of the speed: of exponent 0 is what is cut into teeth, scales and
+magnets, of 2 what inertia makes of such an error (T = J e'' = J k^2 w^2 e). What passes a resonance goes as 1
+or r^2 over |1 - r^2 + 2 i d r|, with r the speed over that of the resonance (den Hartog, Mechanical
+Vibrations, ch. 2: a constant force, and a shaken base), where that is better by an F test.
 """
 
 from __future__ import annotations
@@ -18,24 +16,22 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hdsim.diagnosis.locate import SHARP, Location
+from hdsim.diagnosis.tracking import banded, hunting, mean_beside, periods
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Part
-from hdsim.estimate.orders import Line
+from hdsim.estimate.orders import Line, angle_read
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.records import Array, Mask
+from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
 from hdsim.log.mapping import MEASURED
 from hdsim.plot import units
 
-#: Most lines of a channel that are tracked, and bands of speed in each record and direction.
-MOST_LINES, BANDS = 3, 6
-#: Fewest periods in a band, and readings in a period.
-PERIODS, READINGS = 4, 6
-#: Variance of a mean of windows that overlap by half, beside that of others: neighbours correlate by 1/6.
-OVERLAP = 4.0 / 3.0
+#: Most lines of a channel that are tracked.
+MOST_LINES = 3
+#: Distance of orders, in units of order over ratio, below which one is the hunting order of the other.
+NEXT = 1.1
 #: Ratio of the fastest to the slowest band without which no growth can be seen.
 SPEEDS = 1.5
 #: What a resonance's peak must be beside both ends of the speeds: twice the power. Chance of less than this
@@ -114,18 +110,30 @@ def tracked(bench: Bench, state: State, locations: Sequence[Location]) -> list[T
             lines.append(line)
     if not lines:
         return []
+    for channel in {line.channel for line in lines}:
+        places = [k for k, line in enumerate(lines) if line.channel == channel]
+        orders = hunting([lines[k].order for k in places], bench.predictors[0].ratio, bench.turns)
+        for k, order in zip(places, orders, strict=True):
+            lines[k] = replace(lines[k], order=order)
+    # Two side lobes of one hunting order are one line, the stronger.
+    lines = list({(line.channel, line.order): line for line in reversed(lines)}.values())[::-1]
     smooth = replace(state, added=tuple(one for one in state.added if one.lives_in[0] != SHARP))
     try:
         residuals = bench.residuals(bench.predict(smooth, everything=True), drift=True)
     except PredictionError:
         return []
     delays = state.delays
-    found = [over_speed(bench, residuals, o, delays.get(o.channel, 0.0)) for o in lines]
+    found = [over_speed(bench, residuals, o, delays.get(o.channel, 0.0), beside=lines) for o in lines]
     return [one for one in found if one is not None]
 
 
 def over_speed(
-    bench: Bench, residuals: Sequence[Array], line: Line, age_s: float = 0.0
+    bench: Bench,
+    residuals: Sequence[Array],
+    line: Line,
+    age_s: float = 0.0,
+    *,
+    beside: Sequence[Line] = (),
 ) -> TrackedOrder | None:
     """One order of what a model leaves over speed; None where no band of speed has periods enough.
 
@@ -134,7 +142,15 @@ def over_speed(
         residuals: of every series, SI units.
         line: channel and order.
         age_s: how late the channel is read beside the motion.
+        beside: other lines; of the channel's those that are its hunting orders are told apart from it.
     """
+    # Other lines nearby are as well an amplitude that wanders.
+    hunting_apart = NEXT * line.order / abs(bench.predictors[0].ratio)
+    apart = [
+        other.order - line.order
+        for other in beside
+        if other.channel == line.channel and 0.0 < abs(other.order - line.order) < hunting_apart
+    ]
     bands: list[Band] = []
     means: list[tuple[float, float]] = []
     steady = power = 0.0
@@ -143,15 +159,13 @@ def over_speed(
             continue
         predictor = bench.predictors[series.record]
         velocity = predictor.motor_velocity
-        angle = predictor.motor_angle - age_s * velocity
-        speeds, waves = periods(angle, velocity, rest, series.train | series.hold, line.order)
-        for picked in _banded(speeds):
-            own = waves[picked]
-            mean, n = own.mean(), len(own)
-            # Of each of the two parts of a complex mean.
-            error = math.sqrt(OVERLAP * float(np.sum(np.abs(own - mean) ** 2)) / (2 * n * (n - 1)))
+        angle = angle_read(predictor, age_s)
+        speeds, places, waves = periods(angle, velocity, rest, series.train | series.hold, line.order)
+        for picked in banded(speeds):
+            own, n = waves[picked], len(picked)
+            mean, error, free = mean_beside(own, places[picked], apart)
             size = math.sqrt(max(abs(mean) ** 2 - error**2, 0.0))
-            half = _student(n - 1) * error
+            half = _student(free) * error
             bands.append(
                 Band(
                     record=predictor.record.name,
@@ -179,46 +193,6 @@ def over_speed(
     )
     _judge(found, np.abs([band.velocity_rad_per_s for band in bands]), sizes, errors)
     found.sentence = _sentence(found)
-    return found
-
-
-def periods(angle: Array, velocity: Array, values: Array, good: Mask, order: float) -> tuple[Array, Array]:
-    """Mean velocity (m,) and complex amplitude (m,) of each period of an order.
-
-    Args:
-        angle: of the motor, shape (n,), rad.
-        velocity: shape (n,), rad/s.
-        values: in which the order is, shape (n,).
-        good: samples that count, shape (n,).
-        order: periods per turn.
-    """
-    phase = order * angle / (2 * np.pi)
-    step = np.abs(np.gradient(phase))
-    cuts = np.flatnonzero(np.diff(np.sign(velocity)) != 0) + 1
-    speeds, waves = [], []
-    for run in np.split(np.arange(len(angle)), cuts):
-        gone = np.abs(phase[run] - phase[run[0]])
-        for first in range(int(gone[-1]) - 1):
-            own = run[(gone >= first) & (gone < first + 2)]
-            kept = own[good[own]]
-            if len(kept) < max(2 * READINGS, 0.9 * len(own)):
-                continue
-            at = np.abs(phase[kept] - phase[run[0]]) - first
-            weight = step[kept] * (1.0 - np.cos(np.pi * at))
-            turned = np.exp(-2j * np.pi * phase[kept])
-            waves.append(2.0 * np.sum(weight * values[kept] * turned) / np.sum(weight))
-            speeds.append(float(np.sum(weight * velocity[kept]) / np.sum(weight)))
-    return np.array(speeds), np.array(waves, dtype=complex)
-
-
-def _banded(speeds: Array) -> list[NDArray[np.intp]]:
-    """Periods of a record in bands of like speed, each direction by itself."""
-    found: list[NDArray[np.intp]] = []
-    for direction in (-1.0, 1.0):
-        own = np.flatnonzero(np.sign(speeds) == direction)
-        own = own[np.argsort(np.abs(speeds[own]))]
-        bands = min(BANDS, len(own) // PERIODS)
-        found += list(np.array_split(own, bands)) if bands else []
     return found
 
 

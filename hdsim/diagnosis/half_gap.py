@@ -3,15 +3,18 @@
 What is seen is how the drive winds up around zero torque. The mean half-gap that this tells depends on the
 flanks that the drive has drawn, on its engagement, and on which teeth have the wear: a gap that is wider by
 the same in every tooth, and one that has grown in proportion to each tooth's own, wind up alike with other
-means, for the teeth that have the least gap touch first. So each is asked how far off the estimate would be
-if it were so.
+means, for the teeth that have the least gap touch first. So the fit is made again for drives that may as well
+be the measured one, and they count as multiple imputations of what is not known (Rubin 1987, Multiple
+Imputation for Nonresponse in Surveys, Eq. 3.1.1 to 3.1.6). How wear shares itself out is no matter of chance:
+the interval reaches from the least that one way allows to the most that another does.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,19 +24,26 @@ from hdsim.drive.parameters import ToothedMesh
 from hdsim.drive.play_as_teeth import half_gap_of_play
 from hdsim.effects import catalogue
 from hdsim.effects._kernels import ARCMIN
-from hdsim.estimate.flanks import drawn_anew, led_by, other_drives, spread_of_draws
-from hdsim.estimate.numbers import undeclared
-from hdsim.estimate.vector import Vector, sensitivities
+from hdsim.estimate.covariance import robust_covariance
+from hdsim.estimate.fit import at_present, fit
+from hdsim.estimate.flanks import drawn_anew
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.state import Added
+from hdsim.estimate.vector import Vector
 
 if TYPE_CHECKING:
+    from hdsim.effects._fitting import Fitting
     from hdsim.estimate.bench import Bench
     from hdsim.estimate.fit import Fit
     from hdsim.estimate.records import Array
     from hdsim.estimate.state import State
     from hdsim.parts import OfTeeth
 
-#: Times that the mean half-gap of another wear is put right: the first is off by an eighth of the difference.
-AGAIN = 2
+#: Evaluations of a fit with other teeth, which begins at the optimum of the model's own with the
+#: sensitivities there.
+EVALUATIONS = 6
+#: Power that it may leave, in units of the least, to be a drive that may have been measured.
+LEFT_IN = 2.0
 
 
 def own_half_gap(state: State) -> float:
@@ -85,94 +95,69 @@ def half_gap_ends(
     gap = half_gap_with(of, state, value)
     # Widths and growths are proportional to their coefficient.
     slope = (gap - own_half_gap(state)) / state.added[k].coefficients[0]
-
-    def moved(moves: Array) -> Array:
-        return np.asarray(slope * moves[:, at.start])
-
-    variance = slope**2 * float(found.covariance[at.start, at.start])
-    variance += float(np.sum(moved(_engagement(bench, found)) ** 2))
-    wears = [_Wear(gap, state, of, value)]
-    if drawn_anew(state):
-        moves = other_drives(bench, found, drawn_anew(state))
-        if moves is None:
-            return None
-        # The fit's covariance holds other flanks by what they move, not that their own gaps differ.
-        variance -= float(spread_of_draws(moved(moves)[:, None])[0, 0])
-        wears += _elsewhere(bench, found, k, of, gap, moved)
-    ends = []
-    for wear in wears:
-        half = 2.0 * math.sqrt(max(variance + _of_flanks(bench, found, wear, moved), 0.0))
-        ends += [wear.half_gap_m - half, wear.half_gap_m + half]
+    rest = bench.stacked(bench.residuals(found.predictions))
+    priors = Vector(state, tuple(found.frees), 0).priors()
+    # The fit's own covariance has other drives in it, by what they would move it were it linear.
+    alone = robust_covariance(found.columns, rest, bench.stacked_blocks(), priors, found.beside)
+    within = slope**2 * float(alone[at.start, at.start])
+    ends: list[float] = []
+    with bench.coarse():
+        for whole in (found, *_worn_otherwise(bench, found, k, of, gap)):
+            ends += _imputed(_told(bench, whole, k), within)
     return max(min(ends), 0.0), max(ends)
 
 
-@dataclass(frozen=True)
-class _Wear:
-    """A way in which the gaps may have grown: the mean half-gap, a model, and what says so there."""
+def _imputed(told: Array, within: float) -> tuple[float, float]:
+    """Ends of a 95 % interval from what each imputation tells, shape (m,), and the variance within one."""
+    from scipy.special import stdtrit
 
-    half_gap_m: float
-    state: State
-    of: OfTeeth
-    value: float
-
-
-def _of_flanks(bench: Bench, found: Fit, wear: _Wear, moved: Callable[[Array], Array]) -> float:
-    """Variance of the estimate over other flanks, whose differences grow where each gap does, m^2."""
-    others = drawn_anew(wear.state)
-    moves = other_drives(bench, found, others, wear.state) if others else None
-    if moves is None:
-        return 0.0
-    gaps = np.array([half_gap_with(wear.of, one, wear.value) for one in others]) - wear.half_gap_m
-    return float(spread_of_draws((moved(moves) - gaps)[:, None])[0, 0])
+    m, between = len(told), 0.0
+    if m > 1:
+        # In the units of a variance within, whose double root is a 95 % interval.
+        between = (1.0 + 1.0 / m) * float(np.var(told, ddof=1)) * (stdtrit(m - 1, 0.975) / 2.0) ** 2
+    half = 2.0 * math.sqrt(within + between)
+    return float(told.mean()) - half, float(told.mean()) + half
 
 
-def _engagement(bench: Bench, found: Fit) -> Array:
-    """How far the engagement's numbers, each off by its prior spread, move a fit's, shape (numbers, p)."""
+def _told(bench: Bench, whole: Fit, k: int) -> Array:
+    """Mean half-gaps, m, by a fit and by those of drives with other teeth that explain the data as well."""
+    fits = [whole]
+    for other in drawn_anew(whole.state, engaged=True):
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            fits.append(
+                fit(bench, other, at_present(whole), prune=False, evaluations=EVALUATIONS, after=whole,
+                    known=(whole.columns, math.nan), rough=True)
+            )  # fmt: skip
+    powers = [bench.power(each.predictions) for each in fits]
+    likely = [each for each, power in zip(fits, powers, strict=True) if power <= LEFT_IN * min(powers)]
+    return np.array([_half_gap_of(each.state, k) for each in likely])
+
+
+def _half_gap_of(state: State, k: int) -> float:
+    """Mean half-gap that an added effect leaves, m."""
+    added = state.added[k]
+    of = catalogue()[added.effect].of_teeth
+    assert of is not None
+    return half_gap_with(of, state, added.settings()[of.field])
+
+
+def _worn_otherwise(bench: Bench, found: Fit, k: int, of: OfTeeth, gap: float) -> Iterator[Fit]:
+    """Fits with the other ways in which gaps can have changed, each from the same mean half-gap."""
     state = found.state
-    section = "drive.mesh.engagement"
-    paths = [f"{section}.{name}" for name in type(state.drive.mesh.engagement).model_fields]
-    frees = [free for path in paths if (free := undeclared(state, path, math.nan))]
-    frees = [free for free in frees if math.isfinite(free.prior)]
-    if not frees:
-        return np.zeros((0, found.columns.shape[1]))
-    unknown = Vector(state, tuple(frees), len(state.added))
-    columns = sensitivities(bench, unknown, unknown.start(), found.predictions)
-    return led_by(bench, found, columns * unknown.priors())
-
-
-def _elsewhere(
-    bench: Bench, found: Fit, k: int, of: OfTeeth, gap: float, moved: Callable[[Array], Array]
-) -> list[_Wear]:
-    """Other ways to grow with the same wind-up, each with its own mean half-gap."""
-    state = found.state
-    rest = replace(state, added=(*state.added[:k], *state.added[k + 1 :]))
-    taken = {*state.effects, *(added.effect for added in rest.added)}
-    wears = []
+    taken = {*state.effects, *(added.effect for added in state.added)}
     for name, effect in catalogue().items():
         says = effect.of_teeth
         if says is None or says.says not in ("play", "growth") or says.says == of.says or name in taken:
             continue
-        mean = gap
+        value = _value(says, state, gap)
         try:
-            for _ in range(AGAIN):
-                like = _with(rest, name, says, mean)
-                same = _with(rest, state.added[k].effect, of, mean)
-                moves = other_drives(bench, found, [like], same)
-                if moves is None:
-                    break
-                mean = gap - float(moved(moves)[0])
-            there = _with(rest, name, says, mean)
+            effect(**{says.field: value})
         except ValidationError:
             continue  # an effect that only widens says nothing of narrower gaps
-        wears.append(_Wear(mean, there, says, _value(says, rest, mean)))
-    return wears
-
-
-def _with(state: State, name: str, of: OfTeeth, half_gap_m: float) -> State:
-    """The model with an effect that leaves a mean half-gap.
-
-    Raises:
-        ValidationError: it cannot.
-    """
-    effect = catalogue()[name](**{of.field: _value(of, state, half_gap_m)})
-    return replace(state, effects=state.effects | {name: effect})
+        fittings: tuple[Fitting, ...] = getattr(effect, "fittings", ())
+        fitting = next(each for each in fittings if each.mesh in ("", "toothed"))
+        unit = Added(name, fitting, (1.0,))
+        one = replace(unit, coefficients=(value / unit.settings()[says.field],))
+        other = replace(state, added=(*state.added[:k], one, *state.added[k + 1 :]))
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            yield fit(bench, other, at_present(found), prune=False, after=found, rough=True)

@@ -10,7 +10,7 @@ import numpy as np
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.numbers import delay_freedoms
-from hdsim.estimate.orders import LEAST_LINE, OverAngle, over_angle
+from hdsim.estimate.orders import LEAST_LINE, Line, OverAngle, order_lines, over_angle
 from hdsim.estimate.records import Array
 
 #: Ages of a channel's readings that are tried, in samples (three spreads of what is believed of a delay), and
@@ -70,6 +70,25 @@ def age_by_lines(bench: Bench, residuals: Sequence[Array], channel: str) -> tupl
     best = int(np.argmax(strongest))
     stands_out = strongest[best] > max(LEAST_LINE, STRONGER * now, CLEARER * turned)
     return (float(ages[best]) if stands_out else 0.0), _left(over, max(now, turned))
+
+
+def lines_shown(bench: Bench, before: Fit, late: Fit) -> list[Line]:
+    """Lines that stand out where the torques are read as late as a fit says, and did not before it.
+
+    Args:
+        bench: the measured series.
+        before: the fit with the ages as they were.
+        late: the one with those that were fitted.
+    """
+    found: list[Line] = []
+    for channel, age_s in late.state.delays.items():
+        earlier, now = (
+            order_lines(bench, bench.residuals(each.predictions, drift=True), channel, age_s=age)
+            for each, age in ((before, before.state.delays.get(channel, 0.0)), (late, age_s))
+        )
+        known = [line.order for line in earlier]
+        found += [line for line in now if all(abs(line.order - order) > 0.5 / bench.turns for order in known)]
+    return found
 
 
 def _strongest(over: OverAngle, age: float) -> float:

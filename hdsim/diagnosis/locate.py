@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from hdsim.diagnosis.coordinates import coordinates, hats, oscillators
 from hdsim.diagnosis.screen import Residual
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.orders import Line, order_lines
+from hdsim.estimate.orders import Line, angle_read, order_lines
 from hdsim.estimate.records import Array
 
 #: Corners of the piecewise linear curves over a coordinate; of a finer one over the output's angle, where a
@@ -72,13 +72,14 @@ class Location:
         return any(place.coordinate == SHARP and place.chance <= level for place in self.places)
 
 
-def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location:
+def locate(bench: Bench, residual: Residual, residuals: list[Array], ages_s: Mapping[str, float]) -> Location:
     """Find the coordinates that explain a residual.
 
     Args:
         bench: the measured series.
         residual: the whitened training residual with the base model's directions removed.
         residuals: of every series, SI units.
+        ages_s: how late channels are read beside the motion.
     """
     found = Location()
     numbers = bench.stacked_series()
@@ -91,11 +92,12 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
         found.powers[channel] = power
         if power <= 0:
             continue
-        lines = order_lines(bench, residuals, channel)
+        age_s = ages_s.get(channel, 0.0)
+        lines = order_lines(bench, residuals, channel, age_s=age_s)
         found.lines += lines
         best = 0.0
         channel_draws = []
-        for name, columns, corners in _designs(bench, own, lines, residuals):
+        for name, columns, corners in _designs(bench, own, lines, residuals, age_s):
             share = residual.share(columns, rows)
             curve = None
             if corners is not None:
@@ -117,13 +119,19 @@ def locate(bench: Bench, residual: Residual, residuals: list[Array]) -> Location
     return found
 
 
-def curves_over(bench: Bench, residuals: Sequence[Array], wanted: Collection[tuple[str, str]]) -> Array:
+def curves_over(
+    bench: Bench,
+    residuals: Sequence[Array],
+    wanted: Collection[tuple[str, str]],
+    ages_s: Mapping[str, float],
+) -> Array:
     """Columns of smooth curves over coordinates of channels, shape (rows, k): what a law may leave there.
 
     Args:
         bench: the measured series.
         residuals: of every series, SI units.
         wanted: coordinate and channel of every curve.
+        ages_s: how late channels are read beside the motion.
     """
     columns: list[Array] = [np.zeros((len(bench.stacked_blocks()), 0))]
     for channel in bench.channels:
@@ -131,13 +139,14 @@ def curves_over(bench: Bench, residuals: Sequence[Array], wanted: Collection[tup
         if not names:
             continue
         own = [k for k, s in enumerate(bench.series) if s.channel == channel and s.record < bench.training]
-        lines = order_lines(bench, residuals, channel) if SHARP in names else []
-        columns += [x for name, x, _ in _designs(bench, own, lines, residuals) if name in names]
+        age_s = ages_s.get(channel, 0.0)
+        lines = order_lines(bench, residuals, channel, age_s=age_s) if SHARP in names else []
+        columns += [x for name, x, _ in _designs(bench, own, lines, residuals, age_s) if name in names]
     return np.hstack(columns)
 
 
 def _designs(
-    bench: Bench, own: list[int], lines: list[Line], residuals: Sequence[Array]
+    bench: Bench, own: list[int], lines: list[Line], residuals: Sequence[Array], age_s: float
 ) -> list[tuple[str, Array, Array | None]]:
     """Name, columns (rows, k) and corners of a curve for every coordinate of one channel."""
     everything = {k: coordinates(bench, bench.series[k], residuals) for k in own}
@@ -168,7 +177,7 @@ def _designs(
     ringing = np.vstack([oscillators(bench, bench.series[k])[bench.series[k].train] for k in own])
     result.append(("frequency", _placed(bench, own, ringing), None))
     angle = np.concatenate(
-        [bench.predictors[bench.series[k].record].motor_angle[bench.series[k].train] for k in own]
+        [angle_read(bench.predictors[bench.series[k].record], age_s)[bench.series[k].train] for k in own]
     )
     ratio = bench.predictors[0].ratio
     relative = angle * (1.0 - 1.0 / ratio)

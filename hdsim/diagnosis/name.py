@@ -231,9 +231,8 @@ def simplest_first(results: list[tuple[str, Fit, Array]], same: float) -> list[t
 
 
 def freedom(found: Fit) -> int:
-    """Free numbers of a fit's last effect; orders that are read from the data are, too."""
-    added = found.state.added[-1]
-    return len(added.coefficients) + len(added.shapes) + len(added.orders)
+    """Free numbers of a fit's last effect."""
+    return found.state.added[-1].freedom
 
 
 def confusable(one: str, other: str) -> bool:

@@ -13,37 +13,28 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, left_of
 from hdsim.diagnosis.contest import Fitted
-from hdsim.diagnosis.late import read_late
+from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
-from hdsim.diagnosis.name import LEAST_SHARE, SAME, Named, name_effect
-from hdsim.diagnosis.revise import revised, without
+from hdsim.diagnosis.name import LEAST_SHARE, Named, name_effect
+from hdsim.diagnosis.revise import revised
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
-from hdsim.estimate.flanks import only_flanks
-from hdsim.estimate.orders import Line, order_lines, power_of
-from hdsim.estimate.records import Array
+from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
+from hdsim.estimate.orders import Line, power_of
 from hdsim.estimate.refit import align, reweigh, together, with_delays
-from hdsim.estimate.unwound import unwound
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7
-#: Part of what a channel lacked at first that a later effect must explain: where no smooth curve over the
-#: coordinates of the effects before it does (a sharp line in an order spectrum is that small), and where one
-#: would, because no formula is exact.
-BEYOND_GAIN, WITHIN_GAIN = 0.005, 0.1
+#: Part of what a channel lacked at first that a later effect must explain where a smooth curve over the
+#: coordinates of the effects before it would, because no formula is exact.
+WITHIN_GAIN = 0.1
 #: Part of what is left that makes it the next effect's, even in the coordinates of those that are there.
 MOST = 0.5
-#: Part of what is left by which it must have fallen for the last name to be asked again.
-NEWS = 0.1
-
-#: Share of resampled records that a name must have won not to be asked again because of a far smaller one.
-CLEAR = 0.995
-
-Step = Callable[[str], object]
 
 
 @dataclass
@@ -86,12 +77,16 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
             return _settled(bench, base, found, during)
         noise = sum(bench.noise_powers.values())
         left, now = (bench.power(each.predictions) - noise for each in (found.fit, late))
+        lines = lines_shown(bench, found.fit, late)
         found.fit = late
-        if now > (1.0 - NEWS) * left or len(found.stages) == MOST_STAGES:
+        if len(found.stages) == MOST_STAGES or (now > (1.0 - NEWS) * left and not lines):
             return _settled(bench, base, found, during)
         # What a delay has blurred may show now.
         align(bench, found.fit)
         reweigh(bench, found.fit)
+        if found.named and lines:
+            tell, before = during("again", "testing each effect again"), found.stages[0].screening
+            found.fit = again(bench, base, found.fit, found.named, tell, before=before, lines=lines)
 
 
 def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Search:
@@ -103,7 +98,9 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
         found.fit = revised(bench, found.fit, found.named, tell)
         if 1 < len(found.named) < count:
             # Beside a name that was needless others may have been wrong.
-            found.fit = together(bench, _again(bench, base, found.fit, found, tell, every=True))
+            before = found.stages[0].screening
+            asked = again(bench, base, found.fit, found.named, tell, before=before, every=True)
+            found.fit = together(bench, asked)
             found.fit = revised(bench, found.fit, found.named, tell)
         for one in found.named:
             for other in found.named:
@@ -111,7 +108,8 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
         # What is left is what this fit leaves, not the rough one before it.
         found.left = left_of(bench, found.fit)
         last = found.stages[-1]
-        last.location = locate(bench, found.left, bench.residuals(found.fit.predictions, drift=True))
+        residuals = bench.residuals(found.fit.predictions, drift=True)
+        last.location = locate(bench, found.left, residuals, found.fit.state.delays)
         last.power = found.left.power
     return found
 
@@ -122,11 +120,11 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     title = "refit" if not found.named else f"with {found.named[-1].name}"
     during("locate", f"locating the residual {title}")
     found.left = left_of(bench, current)
-    stage = Stage(
-        title, locate(bench, found.left, bench.residuals(current.predictions, drift=True)), found.left.power
-    )
+    residuals = bench.residuals(current.predictions, drift=True)
+    location = locate(bench, found.left, residuals, current.state.delays)
+    stage = Stage(title, location, found.left.power)
     found.stages.append(stage)
-    if only_flanks(bench, stage.location.structured * stage.power, found.left.project):
+    if nothing_but_flanks(bench, stage.power, found.left.project):
         return None
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
@@ -155,7 +153,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         tell = during("again", "testing each effect again beside the others")
         if current.undetermined:
             current = together(bench, current, rough=True)
-        current = _again(bench, base, current, found, tell)
+        current = again(bench, base, current, found.named, tell, before=found.stages[0].screening)
         current = sharpened(bench, current)
         align(bench, current)
         reweigh(bench, current)
@@ -189,7 +187,8 @@ def _one_more(
         screening = ranked_anew(stage.screening, left)
     if stage.screening is None or screening.chance < stage.screening.chance:
         stage.screening = screening
-    if not screening.ranked or screening.chance > LEVEL:
+    # What is more than noise and other flanks is there, however few blocks of time tell a trace of it.
+    if not screening.ranked or (screening.chance > LEVEL and (found.named or not bench.redrawn)):
         return None
     if not found.named and screening.ranked[0].share.share < LEAST_SHARE:
         return None
@@ -199,9 +198,10 @@ def _one_more(
     if named is None:
         return None
     change = left.project(bench.trace(current.predictions, named.fit.predictions))
-    if only_flanks(bench, float(change @ change), left.project):
+    traces = None if found.named else [columns for _, columns in screening.seen.values()]
+    if float(change @ change) < of_other_flanks(bench, left.project, traces):
         return None
-    named.gain = _gain(bench, base, current, named.fit)
+    named.gain = gain(bench, base, current, named.fit)
     named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
     sharp = named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL)
     if found.named and sharp:
@@ -224,7 +224,8 @@ def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
         for coordinate in one.lives_in
         for channel in channels
     }
-    curves = curves_over(bench, bench.residuals(current.predictions, drift=True), homes)
+    residuals = bench.residuals(current.predictions, drift=True)
+    curves = curves_over(bench, residuals, homes, current.state.delays)
     return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
 
 
@@ -245,17 +246,11 @@ def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
     return found
 
 
-def _gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
-    """Largest part of what a channel lacked at first, beyond its noise, that a fit explains more."""
-    first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
-    noise = bench.noise_powers
-    return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
-
-
 def _of_lines(bench: Bench, before: Fit, now: Fit, lines: Sequence[Line]) -> float:
     """Part of the lines of what was left that a fit explains."""
     last, new = (
-        power_of(bench, bench.residuals(each.predictions, drift=True), lines) for each in (before, now)
+        power_of(bench, bench.residuals(each.predictions, drift=True), lines, each.state.delays)
+        for each in (before, now)
     )
     return float(np.clip(1.0 - new / last, 0.0, 1.0)) if last > 0 else 0.0
 
@@ -265,86 +260,3 @@ def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
     first, last = (bench.channel_powers(each.predictions) for each in (base, now))
     noise = bench.noise_powers
     return any(last[c] - noise[c] >= BEYOND_GAIN * (first[c] - noise[c]) for c in first)
-
-
-def _again(bench: Bench, base: Fit, current: Fit, found: Search, tell: Step, *, every: bool = False) -> Fit:
-    """Ask every name again; ``found.named`` is changed in place.
-
-    The last one was asked beside the others, and is so again only where they have changed since, or where it
-    has gone to the end of its range.
-    """
-    first = bench.power(current.predictions)
-    k = 0
-    while k < len(found.named):
-        stuck = current.state.added[k].at_limit
-        if not (stuck or every) and _clear(found.named[k], found.named[-1]):
-            k += 1
-            continue
-        settled = bench.power(current.predictions) > (1.0 - NEWS) * first
-        if k == len(found.named) - 1 and settled and not (stuck or every):
-            break
-        own, added = found.named[k], current.state.added
-        rest = without(bench, current, k)
-        if rest is None:
-            k += 1
-            continue
-        left = left_of(bench, rest)
-        lines: list[Line] = []
-        residuals = bench.residuals(rest.predictions, drift=True)
-        for channel in bench.channels:
-            lines += order_lines(bench, residuals, channel)
-        tell(f"{own.name} again")
-        screening = screen(bench, rest.state, left, lines, before=found.stages[0].screening)
-        named = None
-        if screening.ranked and screening.chance <= LEVEL:
-            named = name_effect(bench, rest, screening, left, on_step=tell)
-        alone = len(found.named) == 1
-        if named is None or (not alone and _gain(bench, base, rest, named.fit) < BEYOND_GAIN):
-            # The others explain what it did, so what it explained is theirs.
-            gone, newest = found.named.pop(k), found.named[-1] if found.named else None
-            if newest is not None and k < len(found.named):
-                if set(added[k].lives_in) & set(added[-1].lives_in):
-                    _inherit(newest, gone)  # a law elsewhere cannot have explained it
-                if newest.name in gone.group:
-                    # It was as good a name before, and neither is needed beside the other.
-                    newest.group[gone.name] = 1.0
-            current = rest
-            continue
-        loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
-        same = named.name == own.name or own.name in named.group
-        if same or stuck or now < (1.0 - SAME) * loss:
-            own = named if named.name == own.name or not same or stuck else own
-            if own is named:
-                # It was fitted last: back to its place; where the same law lay better, that is kept.
-                last = len(added) - 1
-                if stuck or named.name != found.named[k].name or now < loss:
-                    current = named.fit.ordered([*range(k), last, *range(k, last)])
-            else:
-                own.group = {name: part for name, part in named.group.items() if name != own.name}
-                own.group[named.name] = 1.0
-            before = found.named[k]
-            own.gain, own.of_lines = before.gain, before.of_lines
-            found.named[k] = own
-        k += 1
-    return current
-
-
-def _inherit(one: Named, other: Named) -> None:
-    """A name that takes another's place explains at least what that did."""
-    one.gain = max(one.gain, other.gain)
-
-
-def _clear(one: Named, newest: Named) -> bool:
-    """Whether a name won so clearly that what came since can't have changed it."""
-    return one is not newest and one.confidence >= CLEAR and not one.group and newest.gain < NEWS * one.gain
-
-
-def left_of(bench: Bench, current: Fit) -> Residual:
-    """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
-    zeros = [column[:, None] for column in unwound(bench, current.state, current.predictions).values()]
-    # A delay of a few samples takes little, but without its bounds it would take all that lags.
-    own = [k for k in range(current.columns.shape[1]) if k >= len(current.frees) or not current.frees[k].step]
-    columns: Array = np.hstack([current.columns[:, own], bench.offset_columns(), *zeros])
-    return Residual(
-        bench.stacked(bench.residuals(current.predictions, drift=True)), columns, bench.stacked_blocks()
-    )

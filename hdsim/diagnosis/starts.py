@@ -10,7 +10,7 @@ from hdsim.effects._fitting import WIDER, Fitting
 from hdsim.estimate.orders import Line
 from hdsim.estimate.state import Added
 
-#: Orders of a periodic term that are taken from the spectra.
+#: Orders of a periodic term that are taken from the spectra, beside further whole ones.
 MOST_ORDERS = 3
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from hdsim.diagnosis.collect import collect
 from hdsim.diagnosis.curve import CurveFit, fit_curve
 from hdsim.diagnosis.decide import decide
+from hdsim.diagnosis.discrepancy import discrepancy
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.growth import tracked
 from hdsim.diagnosis.name import Named
@@ -33,6 +34,7 @@ from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Check
+from hdsim.estimate.drift import drifted
 from hdsim.estimate.fit import Fit, base_intervals
 from hdsim.estimate.found import DataProblem
 from hdsim.estimate.offsets import Zeros
@@ -43,6 +45,7 @@ from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit, tie, together
+from hdsim.estimate.repeat import with_repeats
 from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
@@ -186,6 +189,9 @@ def _diagnosed(
     unknown = decision.kind == "unknown"
     curve: CurveFit | None = None
     place = (found.stages[0] if unknown else found.stages[-1]).location
+    with step("prove", "asking what is left and the zeros of the records"):
+        lacks = evidence.left_chance <= RULES.chance
+        current = drifted(bench, current, discrepancy(bench, current, place) if lacks else None)
     if unknown or (named and evidence.left_chance <= RULES.chance):
         # What has no name, or what the names leave of their own, is a curve.
         with step("curve", "fitting the curve of the unidentified effect"):
@@ -202,6 +208,7 @@ def _diagnosed(
         orders = tracked(bench, current.state, [stage.location for stage in found.stages])
     with step("prove", "validating on held-out data"):
         gap = with_baselines(bench, start, gap, black_box=black_box)
+        gap = with_repeats(bench, current.state, gap, predictions["after"])
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
     problems += [*doubts, *beginnings(bench), *one_way(bench), *moving_zeros(bench, current.predictions)]

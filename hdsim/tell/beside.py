@@ -33,8 +33,11 @@ def baselines(gaps: Mapping[str, Gap], model: str = "the fitted model") -> list[
         unit = unit_of(gap)
         regression, after, noise = (short(unit.factor * v) for v in (gap.regression, gap.after, gap.noise))
         box = "" if gap.black_box is None else f", gradient boosting {short(unit.factor * gap.black_box)}"
+        turns = ""
+        if gap.repeats is not None:
+            turns = f"; {100 * gap.repeats:.0f} % of the final residual's power repeats from turn to turn"
         said.append(
             f"{spoken(channel)}: linear regression {regression} {unit.name}{box}, {model} {after}, "
-            f"noise {noise}"
+            f"noise {noise}{turns}"
         )
     return said

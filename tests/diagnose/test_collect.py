@@ -6,10 +6,11 @@ import pytest
 from diagnose_bench import scenario
 from test_small_names import hidden
 
+from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.collect import collect
 from hdsim.diagnosis.decide import decide
 from hdsim.diagnosis.locate import SHARP, locate
-from hdsim.diagnosis.search import Search, Stage, left_of
+from hdsim.diagnosis.search import Search, Stage
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.refit import together
 
@@ -27,7 +28,7 @@ def test_an_error_of_the_outputs_encoder_is_nothing_that_a_motors_unbalance_leav
     # The other one is not found: nearly all that is left is of the wave generator's angle, in the output's.
     fit = together(bench, whole.final, replace(whole.final.state, added=(whole.final.state.added[k],)))
     left = left_of(bench, fit)
-    location = locate(bench, left, bench.residuals(fit.predictions, drift=True))
+    location = locate(bench, left, bench.residuals(fit.predictions, drift=True), {})
     assert location.places[0].coordinate == SHARP
     assert location.places[0].channel == "output_angle"
     found = Search(fit, left, [Stage("with it", location, left.power)], [whole.named[k]])

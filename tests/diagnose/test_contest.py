@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
 
-from hdsim.diagnosis.contest import _linear, _Point, contest
-from hdsim.diagnosis.search import left_of
+from hdsim.diagnosis.again import left_of
+from hdsim.diagnosis.candidate_fits import Point, linear_fit
+from hdsim.diagnosis.contest import contest
 from hdsim.diagnosis.traces import screen
 from hdsim.estimate.fit import sharpened
 from hdsim.estimate.opening import bench_for
@@ -49,12 +50,12 @@ def test_what_numbers_of_the_base_can_say_is_held_by_what_was_believed_of_them(o
     bench, base = opened
     _, one = candidate(bench, base, "unbalance")
     rest = bench.stacked(bench.residuals(base.predictions))
-    point = _Point(np.zeros(len(base.frees)), base.state, base.predictions, base.columns, rest)
+    point = Point(np.zeros(len(base.frees)), base.state, base.predictions, base.columns, rest)
     # Mass and weight are three numbers for two directions; a trace is as exact as its simulation.
     rng = np.random.default_rng(1)
     size = np.sqrt(np.mean(one.columns**2))
     columns = one.columns + 1e-3 * size * rng.standard_normal(one.columns.shape)
-    moves, coefficients = _linear(base, point, one.added, columns, float(np.mean(rest**2)))
+    moves, coefficients = linear_fit(base, point, one.added, columns, float(np.mean(rest**2)))
     mass = [free.name for free in base.frees].index("load.gravity.mass_kg")
     theta = base.theta[mass] + moves[mass]
     assert abs(theta) < 0.3

@@ -34,7 +34,7 @@ def prepared(record: Record, base: Scenario) -> tuple[Bench, Refit, Location]:
     left = Residual(
         bench.stacked(residuals), np.hstack([fitted.fit.columns, offsets]), bench.stacked_blocks()
     )
-    return bench, fitted, locate(bench, left, residuals)
+    return bench, fitted, locate(bench, left, residuals, {})
 
 
 def catch(angle, velocity):

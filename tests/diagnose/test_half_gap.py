@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hdsim
-from hdsim.diagnosis.half_gap import half_gap_ends, half_gap_with, own_half_gap
+from hdsim.diagnosis.half_gap import _imputed, half_gap_ends, half_gap_with, own_half_gap
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
@@ -90,3 +90,15 @@ def test_other_flanks_widen_a_fit_by_what_they_move_it() -> None:
     after = np.diag(found.covariance)
     assert np.all(after >= before)
     assert after[-1] > 1.1 * before[-1]
+
+
+@pytest.mark.parametrize("within", [0.0, 1.0])
+def test_imputations_hold_one_more_drive_as_often_as_they_say(within: float) -> None:
+    # What one more drive tells, with the scatter of a fit: a draw of the same two spreads.
+    rng, trials, held = np.random.default_rng(3), 4000, 0
+    for _ in range(trials):
+        told = 10.0 + 2.0 * rng.standard_normal(9)
+        true = 10.0 + 2.0 * rng.standard_normal() + within * rng.standard_normal()
+        low, high = _imputed(told, (within * 1.96 / 2.0) ** 2)
+        held += low < true < high
+    assert abs(held / trials - 0.95) < 3 * np.sqrt(0.95 * 0.05 / trials) + 0.005 * within

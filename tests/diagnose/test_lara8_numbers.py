@@ -72,16 +72,21 @@ def test_friction_that_is_far_off_comes_back_in_the_refit(tmp_path, stiffness, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", [1.0, 2.0])
+@pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
 def test_friction_at_three_speeds_is_its_authors(tmp_path, stiffness):
     found = diagnose([lara.record()], lara.base(tmp_path, stiffness, False, True), zeros="trusted").verdict
     effect = next(effect for effect in found.effects if effect.name == "input_coulomb_viscous")
     coulomb, viscous = (effect.parameters[n].value for n in ("coulomb_nm", "viscous_nm_s_per_rad"))
-    for speed in SPEEDS:
+    # From half the stiffness the one start leaves open what is friction and what inertia, most at low speed.
+    for speed in SPEEDS if stiffness > 0.5 else SPEEDS[-1:]:
         assert lara.RATIO * (coulomb + viscous * lara.RATIO * speed) == pytest.approx(
             friction_nm(speed), rel=0.15
         )
+    law = {"coulomb_nm": 0.076, "viscous_nm_s_per_rad": 0.00135}  # the line through the first and last
+    for name, value in law.items():
+        low, high = effect.parameters[name].interval
+        assert low <= value <= high
     gap = found.gap["motor_torque"]
-    assert gap.after < 1.3 * gap.regression
+    assert gap.after < (1.3 if stiffness > 0.5 else 2.0) * gap.regression
     # The zero is trusted, so nothing is said of one that would be one number with friction.
     assert not [p for p in found.data_problems if p.kind == "one way"]

@@ -161,7 +161,7 @@ def test_held_out_data_say_how_surely_they_bear_a_change_out(tmp_path):
 
 def test_of_two_that_explain_the_same_the_simpler_one_has_the_name():
     def result(name, free, losses):
-        added = SimpleNamespace(coefficients=(1.0,) * free, shapes=(), orders=())
+        added = SimpleNamespace(freedom=free)
         return name, SimpleNamespace(state=SimpleNamespace(added=[added])), np.array(losses)
 
     free, simple = result("free", 2, [1.0, 2.0, 1.0, 2.0]), result("simple", 1, [1.5, 1.6, 1.6, 1.4])

@@ -1,11 +1,15 @@
 """Order spectra of what a model leaves: over part of a turn, and of torques that are read late."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from hdsim.diagnosis.late import age_by_lines
+from hdsim.diagnosis.late import age_by_lines, lines_shown
+from hdsim.diagnosis.starts import starts
+from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.orders import order_lines
+from hdsim.estimate.orders import Line, order_lines, power_of
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record
 
@@ -41,6 +45,42 @@ def test_the_age_of_a_torque_is_told_by_the_order_that_it_blurs(late):
     assert age == pytest.approx(1e-3 * late, abs=2.5e-4)
 
 
+@pytest.mark.parametrize("late", [-2, 2.5])
+def test_an_order_that_a_late_reading_blurs_is_a_line_where_its_age_is_known(late):
+    time = np.arange(6000) * 1e-3
+    angle = 60.0 * (1 - np.cos(0.5 * np.pi * time)) + 3.0 * time
+    then = np.interp(time - 1e-3 * late, time, angle)
+    torque = 0.01 * np.sin(28 * then + 0.4) + 0.004 * np.random.default_rng(2).standard_normal(len(time))
+    bench = bench_of(time, angle, torque)
+    blurred = order_lines(bench, [torque], "motor_torque")
+    assert not any(line.amplitude > 0.005 for line in blurred)
+    line = order_lines(bench, [torque], "motor_torque", age_s=1e-3 * late)[0]
+    assert line.order == 28.0
+    assert line.amplitude == pytest.approx(0.01, rel=0.05)
+    # What the lines hold is as blurred: of white noise and one sine their power is the sine's.
+    power, sigma = 0.5 * 0.01**2 * bench.series[0].train.sum(), bench.series[0].sigma
+    assert power_of(bench, [torque], [line], {"motor_torque": 1e-3 * late}) * sigma**2 == pytest.approx(
+        power, rel=0.05
+    )
+    assert power_of(bench, [torque], [line], {}) * sigma**2 < 0.3 * power
+
+
+def test_lines_that_an_age_brings_to_light_are_told():
+    time = np.arange(6000) * 1e-3
+    angle = 60.0 * (1 - np.cos(0.5 * np.pi * time)) + 3.0 * time
+    then = np.interp(time - 2.5e-3, time, angle)
+    noise = 0.004 * np.random.default_rng(2).standard_normal(len(time))
+    torque = 0.01 * np.sin(28 * then) + 0.01 * np.sin(2 * then) + noise
+    bench = bench_of(time, angle, torque)
+
+    def read(**delays):
+        return SimpleNamespace(predictions=[np.zeros(len(time))], state=SimpleNamespace(delays=delays))
+
+    [line] = lines_shown(bench, read(), read(motor_torque=2.5e-3))
+    assert line.order == 28.0
+    assert lines_shown(bench, read(motor_torque=2.5e-3), read(motor_torque=2.5e-3)) == []
+
+
 def test_a_torque_without_lines_has_no_age():
     time = np.arange(6000) * 1e-3
     angle = 60.0 * (1 - np.cos(0.5 * np.pi * time))
@@ -57,3 +97,10 @@ def test_friction_that_ripples_is_not_late():
     turning = np.sign(np.sin(0.5 * np.pi * time))
     torque = 0.01 * turning * np.sin(2 * angle) + 0.001 * np.random.default_rng(2).standard_normal(6000)
     assert age_by_lines(bench_of(time, angle, torque), [torque], "motor_torque")[0] == 0.0
+
+
+def test_beyond_the_strongest_lines_an_effect_has_whole_orders_only():
+    (fitting,) = catalogue()["motor_torque_ripple"].fittings
+    lines = [Line("motor_torque", order, 0.01, 0.1) for order in (12.0, 14.6, 28.0, 3.3, 24.0, 7.7)]
+    (added,) = starts("motor_torque_ripple", fitting, lines, {})
+    assert added.orders == (12.0, 14.6, 28.0, 24.0)

@@ -19,9 +19,10 @@ FRICTION_NM = {1: 2.66, 3: 2.17, 4: 2.44, 6: 1.18, 7: 1.14}
 #: What least squares of the motor's torque leave in the held-out stretches of both records, N m at the motor:
 #: over velocity and its sign of a spline with a knot each 72 ms, beside inertia and the sensor's torque.
 REGRESSED_NM = {1: 0.0093, 3: 0.0100, 4: 0.0101, 6: 0.0048, 7: 0.0083}
-#: Most that may be left of the gap. Joint 6 turns one way in most of its held-out stretches: there friction
-#: is an offset, and no gap.
-LEFT = {1: 0.25, 3: 0.28, 4: 0.25, 6: 0.70, 7: 0.26}
+#: Most that may be left of the gap: a quarter, or where more does not repeat from turn to turn of the motor
+#: (which the test holds against the data), as on joint 3, what is left now. Joint 6 turns one way in most of
+#: its held-out stretches: there friction is an offset, and no gap.
+LEFT = {1: 0.25, 3: 0.28, 4: 0.25, 6: 0.53, 7: 0.25}
 #: Names of one thing for these data: friction that turns with the direction.
 FRICTIONS = {"input_coulomb_viscous", "lugre_friction", "load_dependent_loss", "stribeck_friction"}
 #: Amplitudes of SOURCE.md, N m at the output: of the torque sensor's order 2, of the motor's order 12.
@@ -63,6 +64,9 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
     assert gap.after < 1.05 * REGRESSED_NM[joint]
     assert gap.after < LEFT[joint] * gap.before
     assert gap.after < 1.3 * gap.regression
+    # What no law of angle, speed and load explains: it is none of them from one turn to the next.
+    floor = gap.after * (1.0 - gap.intervals["repeats"][1]) ** 0.5
+    assert LEFT[joint] == 0.25 or floor > 0.25 * gap.before
     # Of the bound of the search nothing is told: the acceleration is the motion's, not its readings' errors'.
     inertia = found.parameters["drive.inertia.motor_kg_m2"]
     assert inertia.value > 0.1 * inertia.start
@@ -89,13 +93,20 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
     if joint in (6, 7):
         # The current is logged late beside the angle: 12 periods a turn would be blurred without saying so.
         assert any(p.kind == "clock" and p.channel == "motor_torque" for p in found.data_problems)
+    motor = {
+        p.value
+        for e in found.effects
+        if e.name == "motor_torque_ripple"
+        for path, p in e.parameters.items()
+        if path.endswith("order")
+    }
+    # The orders that the source lists for the currents of joints 5 to 7, and twice the first two of them,
+    # which the current's delay blurs.
+    assert motor == {6: {12.0, 14.0, 24.0, 28.0}, 7: {7.0, 12.0}}.get(joint, set())
     if joint == 6:
-        # The torque sensor ripples twice a wave-generator turn (200 per output turn, ratio 100); the
-        # motor's own order 12 is 1200 per output turn, 2 % of what was missing, but a sharp line.
-        named = {
-            (e.name, p.value) for e in found.effects for path, p in e.parameters.items() if "order" in path
-        }
-        assert {("sensors", 2.0), ("motor_torque_ripple", 12.0)} <= named
+        # The torque sensor ripples twice a wave-generator turn: 200 per output turn, ratio 100.
+        sensors = next(effect for effect in found.effects if effect.name == "sensors")
+        assert 2.0 in {p.value for path, p in sensors.parameters.items() if path.endswith("order")}
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import hdsim
+from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.screen import Residual
-from hdsim.diagnosis.search import left_of
 from hdsim.diagnosis.starts import neighbours, starts
 from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.traces import screen, traces

@@ -25,5 +25,10 @@ def test_a_black_box_stands_between_the_two():
     assert "linear regression 3.2 mN m, gradient boosting 2.5, the fitted model 2.1" in said
 
 
+def test_what_repeats_from_turn_to_turn_is_said():
+    (said,) = baselines({"motor_torque": GAP.model_copy(update={"repeats": 0.52})})
+    assert said.endswith("noise 2; 52 % of the final residual's power repeats from turn to turn")
+
+
 def test_without_a_baseline_nothing_is_said():
     assert baselines({"motor_torque": GAP.model_copy(update={"regression": None})}) == []

@@ -1,0 +1,148 @@
+"""Names that are asked again beside the others, and what a model leaves for any name to explain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hdsim.diagnosis.name import SAME, Named, freedom, name_effect
+from hdsim.diagnosis.revise import without
+from hdsim.diagnosis.screen import LEVEL, Residual
+from hdsim.diagnosis.traces import Screening, screen
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.orders import Line, order_lines
+from hdsim.estimate.records import Array
+from hdsim.estimate.state import Added
+from hdsim.estimate.unwound import unwound
+
+#: Part of what a channel lacked at first that a later effect must explain where no smooth curve over the
+#: coordinates of the effects before it does: a sharp line in an order spectrum is that small.
+BEYOND_GAIN = 0.005
+#: Part of what is left by which it must have fallen for the last name to be asked again.
+NEWS = 0.1
+#: Share of resampled records that a name must have won not to be asked again because of a far smaller one.
+CLEAR = 0.995
+
+Step = Callable[[str], object]
+
+
+def again(
+    bench: Bench,
+    base: Fit,
+    current: Fit,
+    names: list[Named],
+    tell: Step,
+    *,
+    before: Screening | None = None,
+    every: bool = False,
+    lines: Sequence[Line] = (),
+) -> Fit:
+    """Ask every name again.
+
+    The last one was asked beside the others, and is so again only where they have changed since, or where it
+    has gone to the end of its range.
+
+    Args:
+        bench: the measured series.
+        base: the re-fitted model.
+        current: the model with all names.
+        names: in the order of ``current.state.added``; changed in place.
+        tell: told what is being done.
+        before: the first screening.
+        every: ask also those that are clear.
+        lines: that have come to light since; names that read their orders from such lines are asked, too.
+    """
+    lit = [(line.channel, line.order) for line in lines]
+    first = bench.power(current.predictions)
+    k = 0
+    while k < len(names):
+        stuck = current.state.added[k].at_limit
+        asked = stuck or every or _reads(current.state.added[k], lit)
+        if not asked and _clear(names[k], names[-1]):
+            k += 1
+            continue
+        settled = bench.power(current.predictions) > (1.0 - NEWS) * first
+        if k == len(names) - 1 and settled and not asked:
+            break
+        own, added = names[k], current.state.added
+        rest = without(bench, current, k)
+        if rest is None:
+            k += 1
+            continue
+        left = left_of(bench, rest)
+        peaks: list[Line] = []
+        residuals = bench.residuals(rest.predictions, drift=True)
+        for channel in bench.channels:
+            age_s = rest.state.delays.get(channel, 0.0)
+            peaks += order_lines(bench, residuals, channel, age_s=age_s)
+        tell(f"{own.name} again")
+        screening = screen(bench, rest.state, left, peaks, before=before)
+        named = None
+        if screening.ranked and screening.chance <= LEVEL:
+            named = name_effect(bench, rest, screening, left, on_step=tell)
+        alone = len(names) == 1
+        if named is None or (not alone and gain(bench, base, rest, named.fit) < BEYOND_GAIN):
+            # The others explain what it did, so what it explained is theirs.
+            gone, newest = names.pop(k), names[-1] if names else None
+            if newest is not None and k < len(names):
+                if set(added[k].lives_in) & set(added[-1].lives_in):
+                    _inherit(newest, gone)  # a law elsewhere cannot have explained it
+                if newest.name in gone.group:
+                    # It was as good a name before, and neither is needed beside the other.
+                    newest.group[gone.name] = 1.0
+            current = rest
+            continue
+        loss, now = bench.power(current.predictions), bench.power(named.fit.predictions)
+        same = named.name == own.name or own.name in named.group
+        better = now < (1.0 - SAME) * loss
+        if same or stuck or better:
+            # Beside the others a simpler name may leave less by now, though the two were alike.
+            simpler = better and freedom(named.fit) <= added[k].freedom
+            own = named if named.name == own.name or not same or stuck or simpler else own
+            if own is named:
+                # It was fitted last: back to its place; where the same law lay better, that is kept.
+                last = len(added) - 1
+                if stuck or named.name != names[k].name or now < loss:
+                    current = named.fit.ordered([*range(k), last, *range(k, last)])
+            else:
+                own.group = {name: part for name, part in named.group.items() if name != own.name}
+                own.group[named.name] = 1.0
+            own.gain, own.of_lines = names[k].gain, names[k].of_lines
+            names[k] = own
+        k += 1
+    return current
+
+
+def _reads(added: Added, lines: Sequence[tuple[str, float]]) -> bool:
+    """Whether an effect has its orders from spectra, and would from these lines, channel and order each."""
+    return any(term.orders_among(lines, 1) for term in added.fitting.terms) if added.orders else False
+
+
+def _inherit(one: Named, other: Named) -> None:
+    """A name that takes another's place explains at least what that did."""
+    one.gain = max(one.gain, other.gain)
+
+
+def _clear(one: Named, newest: Named) -> bool:
+    """Whether a name won so clearly that what came since can't have changed it."""
+    return one is not newest and one.confidence >= CLEAR and not one.group and newest.gain < NEWS * one.gain
+
+
+def left_of(bench: Bench, current: Fit) -> Residual:
+    """The whitened residual without what the model's own numbers and the sensors' offsets explain."""
+    zeros = [column[:, None] for column in unwound(bench, current.state, current.predictions).values()]
+    # A delay of a few samples takes little, but without its bounds it would take all that lags.
+    own = [k for k in range(current.columns.shape[1]) if k >= len(current.frees) or not current.frees[k].step]
+    columns: Array = np.hstack([current.columns[:, own], bench.offset_columns(), *zeros])
+    return Residual(
+        bench.stacked(bench.residuals(current.predictions, drift=True)), columns, bench.stacked_blocks()
+    )
+
+
+def gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
+    """Largest part of what a channel lacked at first, beyond its noise, that a fit explains more."""
+    first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
+    noise = bench.noise_powers
+    return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)

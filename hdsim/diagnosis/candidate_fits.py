@@ -1,0 +1,236 @@
+"""Fits of one candidate of the contest: a few steps, to the end, and from where its next minima may lie.
+
+Each begins where a linear fit says that the effect lies, with the base's answer to it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hdsim.diagnosis.traces import designs
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.covariance import correlation
+from hdsim.estimate.fit import Fit, at_present, fit, sharpened
+from hdsim.estimate.numbers import scaled
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Array
+from hdsim.estimate.refit import REACHED
+from hdsim.estimate.state import Added, State
+from hdsim.estimate.vector import Vector, sensitivities
+
+#: Evaluations of a rough and of a full fit.
+ROUGH, FULL = 5, 12
+#: Farthest that the base's numbers go with the screen's word alone, as a logarithm.
+FARTHEST = 2.0
+#: Part of the drive's compliance that the screen may give to an effect in series.
+SOFTEST = 0.85
+#: Part of the screen's coefficient at which a compliance's fit, or one that led astray, begins a second time.
+SMALL = 0.2
+#: Most times that a fit from another minimum is carried on, and part by which what it leaves must have fallen
+#: at a time: the way there is a bent valley.
+FARTHER, STALLED = 6, 0.01
+
+
+@dataclass
+class Point:
+    """Where the base is linear: its numbers and those of the effects that it has, and what it leaves there.
+
+    Attributes:
+        theta: logarithms of factors on the fitted base's numbers, shape (f,).
+        state: the base there.
+        predictions: its predictions.
+        columns: sensitivities to all numbers, shape (rows, p).
+        left: whitened residual, shape (rows,).
+    """
+
+    theta: Array
+    state: State
+    predictions: Sequence[Array]
+    columns: Array
+    left: Array
+
+
+def point_at(bench: Bench, base: Fit, theta: Array) -> Point:
+    """The base at other numbers of its own, shape (f,)."""
+    frees = at_present(base)
+    state = scaled(base.state, frees, theta.tolist())
+    there = [free.moved(float(t)) for free, t in zip(frees, theta, strict=True)]
+    vector = Vector(state, tuple(there), 0)
+    predictions = bench.predict(state)
+    return Point(
+        theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
+        bench.stacked(bench.residuals(predictions)),
+    )  # fmt: skip
+
+
+def fits_from(bench: Bench, base: Fit, given: Point, added: Added) -> list[Fit]:
+    """The model with an effect, from where a linear fit at a point says that it lies."""
+    (columns,) = designs(bench, given.state, given.predictions, [added])
+    if columns is None:
+        return []
+    # Delays stay where they are: nothing bounds them here.
+    moving = np.ones(given.columns.shape[1])
+    moving[: len(base.frees)] = [not free.step for free in base.frees]
+    both = np.hstack([given.columns * moving, columns])
+    found, *_ = np.linalg.lstsq(both, given.left, rcond=1e-6)
+    return rough_fits(bench, base, given, added, columns, power_of_sample(bench, given.left - both @ found))
+
+
+def rough_fits(
+    bench: Bench, base: Fit, point: Point, added: Added, columns: Array, power: float
+) -> list[Fit]:
+    """The model with an effect, a few steps from where a linear fit says that it lies.
+
+    The effects before it move along: they may have taken what is its. Compliances are far from linear in
+    their shape, and the drive's own stands in for them: they start closer to the base too, and where all that
+    the re-fit made the drive softer is theirs.
+
+    Args:
+        bench: the measured series.
+        base: the fitted model without the effect.
+        point: where the base is linear.
+        added: the effect.
+        columns: its trace at the point, shape (rows, k).
+        power: what one independent sample of the linear fit's residual counts.
+    """
+    frees = at_present(base)
+    f, before_it = len(frees), Vector(base.state, (), 0)
+    x0 = before_it.start()
+    moves, coefficients = linear_fit(base, point, added, columns, power)
+    stiff = np.array([*(free.compliance for free in frees), *(False for _ in x0)], dtype=bool)
+    series = added.fitting.in_series
+    if series:
+        # Beside a compliance it is the drive's own compliance, not its stiffness, that moves in proportion.
+        given_away = -np.log1p(-np.clip(moves, None, SOFTEST))
+        moves = np.where(stiff, np.clip(given_away, -FARTHEST, FARTHEST), moves)
+    begins = [(coefficients, moves)]
+    if series and point.state is base.state:
+        begins.append((SMALL * coefficients, SMALL * moves))
+        stiffer = np.zeros(len(moves))
+        stiffer[:f] = np.where(stiff[:f], np.maximum(-base.theta, 0.0), 0.0)
+        size = float(columns[:, 0] @ (point.columns @ np.expm1(-stiffer)) / (columns[:, 0] @ columns[:, 0]))
+        if size > 0:
+            begins.append((np.array([size]), stiffer))
+    if added.fitting.play:
+        # By as much as the trace is too small, the spring beyond the play is stiffer.
+        beyond = math.log(max(float(coefficients[0]), 1.0))
+        begins.append((np.ones(1), np.where(stiff, np.clip(beyond, -FARTHEST, FARTHEST), moves)))
+    lower, upper = before_it.bounds()
+    found: list[Fit] = []
+
+    def begin(start: Array, move: Array) -> None:
+        earlier = before_it.state(np.clip(x0 + move[f:], lower, upper)).added
+        state = replace(base.state, added=(*earlier, replace(added, coefficients=tuple(start))))
+        theta = {free.name: float(t) for free, t in zip(frees, point.theta + move[:f], strict=True)}
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            found.append(
+                fit(bench, state, frees, prune=False, evaluations=ROUGH, theta=theta, after=base,
+                    known=(np.hstack([point.columns, columns]), power), rough=True)
+            )  # fmt: skip
+
+    for start, move in begins:
+        begin(start, move)
+    before = bench.power(base.predictions)
+    if not series and all(bench.power(each.predictions) > before for each in found):
+        # A step so long that it leads astray: where numbers almost stand in for one another.
+        begin(SMALL * coefficients, SMALL * moves)
+    return found
+
+
+def linear_fit(base: Fit, point: Point, added: Added, columns: Array, power: float) -> tuple[Array, Array]:
+    """How the model's numbers move, shape (p,), and an effect's coefficients, shape (k,), by a linear fit.
+
+    All at once, with their priors and bounds: what an effect says as well as the model's numbers do is shared
+    out by what was believed of those, and nothing goes where neither the data nor a prior tell.
+    """
+    from scipy.optimize import lsq_linear
+
+    p, n = point.columns.shape[1], point.columns.shape[1] + columns.shape[1]
+    unit = replace(added, coefficients=(0.0,) * columns.shape[1])
+    vector = Vector(replace(base.state, added=(*base.state.added, unit)), tuple(at_present(base)), 0)
+    x0 = vector.start({free.name: float(t) for free, t in zip(vector.frees, point.theta, strict=True)})
+    both, priors = np.hstack([point.columns, columns]), vector.priors()[:n]
+    lower, upper = (end[:n] - x0[:n] for end in vector.bounds())
+    far = np.where(np.arange(n) < len(base.frees), FARTHEST, np.inf)
+    bounds = np.minimum(np.maximum(lower, -far), 0.0), np.maximum(np.minimum(upper, far), 0.0)
+    worth = 1.0 / math.sqrt(power)
+    q, r = np.linalg.qr(np.vstack([worth * both, np.diag(1.0 / priors)]))
+    aim = np.concatenate([worth * point.left, (vector.centre(x0) - x0)[:n] / priors])
+    found = lsq_linear(r, q.T @ aim, bounds).x
+    return found[:p], found[p:]
+
+
+def full_fits(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
+    """A rough fit carried on to its end, if it gets there.
+
+    Short of the noise it may have stopped because its sensitivities no longer held: they are made anew.
+    """
+    if bench.power(found.predictions) > REACHED * sum(bench.noise_powers.values()):
+        found = sharpened(bench, found)
+    theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
+    state = replace(base.state, added=found.state.added)
+    evaluations = FULL + 4 * bool(found.state.added[-1].shapes)
+    known = found.columns, power_of_sample(bench, bench.stacked(bench.residuals(found.predictions)))
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        full = fit(bench, state, found.frees, prune=False, evaluations=evaluations, theta=theta, after=base,
+                   known=known, rough=True)  # fmt: skip
+        return [full]
+    return []
+
+
+def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> list[Fit]:
+    """An effect's fits from where its cost may have its next minima, carried on where they leave less.
+
+    Args:
+        bench: the measured series.
+        base: the fitted model without the effect.
+        found: the fit.
+        enough: power of what another may leave after the first time to be carried on further.
+    """
+    added = found.state.added[-1]
+    others = [
+        replace(
+            added,
+            coefficients=(1.0,) * len(added.coefficients),
+            shapes=(*added.shapes[:k], v, *added.shapes[k + 1 :]),
+        )
+        for k, shape in enumerate(added.fitting.shapes)
+        for v in shape.next_minima(added.shapes[k])
+    ]
+    several: list[Fit] = []
+    if others:
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            there = point_at(bench, base, found.theta)
+            for other in others:
+                several += fits_from(bench, base, there, other)
+    return [end for each in several for end in _to_its_end(bench, base, each, enough)]
+
+
+def _to_its_end(bench: Bench, base: Fit, found: Fit, enough: float) -> list[Fit]:
+    """A fit carried on while that takes much off what it leaves: from another minimum the way is long.
+
+    Args:
+        bench: the measured series.
+        base: the fitted model without the effect.
+        found: the fit.
+        enough: power of what a fit may leave after the first time to be carried on further.
+    """
+    ends: list[Fit] = []
+    for _ in range(FARTHER):
+        before = bench.power(found.predictions)
+        further = full_fits(bench, base, found)
+        ends += further
+        if not further or not bench.power(further[0].predictions) < min((1.0 - STALLED) * before, enough):
+            break
+        found = further[0]
+    return ends
+
+
+def power_of_sample(bench: Bench, rest: Array) -> float:
+    """What one independent sample of a residual counts."""
+    return max(float(np.mean(rest**2)), 1e-30) * correlation(rest, bench.stacked_blocks())
