@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 from judging import OUTCOMES, Line, false_alarm, false_name, outcome, said
+from page_tables import BANDS, band, cpu_seconds, rate, spread, table
+from page_teeth import teeth
 from page_text import HEAD, limits
 from reliability import binned, calibration_error
 from reliability import picture as reliability_picture
-from scipy.stats import binomtest
 
 __all__ = ["page", "reliability_picture"]
 
-#: Bands of strength: they meet at the middle, in logarithm, between the strengths that are asked for.
-BANDS = ((0.5, 1.5), (1.5, 3.5), (3.5, 10.0), (10.0, 35.0), (35.0, 100.0))
 #: Required share of the reducible held-out residual; of cases as strong as this.
 CLOSED, CLEAR = 0.9, 3.5
 LEFT_OUT = "mujoco"
@@ -24,38 +23,9 @@ LEFT_OUT = "mujoco"
 SHOWN = {"wrong name": "wrong effect"}
 
 
-def rate(right: int, count: int) -> str:
-    """A rate with its Clopper-Pearson 95 % interval, in words."""
-    if count == 0:
-        return "-"
-    bounds = binomtest(right, count).proportion_ci(0.95, "exact")
-    return f"{100 * right / count:.0f} % ({100 * bounds.low:.0f} to {100 * bounds.high:.0f})"
-
-
-def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
-    """A Markdown table."""
-    if not rows:
-        return ["None."]
-    cells = [[str(cell).replace("|", "/").replace("\n", " ") for cell in row] for row in rows]
-    lines = [" | ".join(row) for row in ([*heads], ["---"] * len(heads), *cells)]
-    return [f"| {line} |" for line in lines]
-
-
 def states(line: Line) -> bool:
     """Whether a case may be stated: no rule was calibrated on it."""
     return line["family"] == LEFT_OUT or line["seed"] % 2 == 1
-
-
-def band(line: Line) -> str:
-    """Band of the strength of what is hidden least visibly."""
-    if not line["strength"] or line["kind"] in ("null", "parameter"):
-        return "-"
-    weakest = min(line["strength"])
-    for low, high in BANDS:
-        # What was not quite reached, or passed, belongs to the end bands.
-        if weakest < high or high == BANDS[-1][1]:
-            return f"{low:g} to {high:g}"
-    raise AssertionError
 
 
 def page(lines: Sequence[Line]) -> str:
@@ -65,7 +35,7 @@ def page(lines: Sequence[Line]) -> str:
     stated = [r for r in drawn if states(r)]
     others = [r for r in drawn if not states(r)]
     text = [HEAD, _counts(lines, drawn), ""]
-    text += [*_asked(stated, others), "", *_confidence(stated), ""]
+    text += [*_asked(stated, others), "", *teeth(stated, others), *_confidence(stated), ""]
     for title, of in DIMENSIONS.items():
         text += [*_by(title, of, stated), ""]
     text += [*_bands_of_families(stated), "", *_time(stated), "", *_confusion(stated), ""]
@@ -170,20 +140,10 @@ def _asked(stated: Sequence[Line], others: Sequence[Line]) -> list[str]:
     ]
     row: list[Any] = ["processor seconds: median / nine tenths / longest"]
     for own in (stated, others):
-        spent = _seconds(own)
-        row += [len(spent), _spread(spent), *(["15 / - / 60"] if own is stated else [])]
+        spent = cpu_seconds(own)
+        row += [len(spent), spread(spent), *(["15 / - / 60"] if own is stated else [])]
     heads = ["", "cases", "rate (95 % interval)", "required", "calibration cases", "rate there"]
     return ["## Requirements", "", *table(heads, [*rows, row])]
-
-
-def _seconds(lines: Sequence[Line]) -> list[float]:
-    return [float(r["cpu_s"]) for r in lines if "cpu_s" in r]
-
-
-def _spread(spent: Sequence[float]) -> str:
-    if not spent:
-        return "-"
-    return f"{np.median(spent):.0f} / {np.quantile(spent, 0.9):.0f} / {max(spent):.0f}"
 
 
 def _confidence(lines: Sequence[Line]) -> list[str]:
@@ -249,8 +209,8 @@ def _time(lines: Sequence[Line]) -> list[str]:
     """Processor seconds by family and seconds by step."""
     rows: list[list[Any]] = []
     for name in dict.fromkeys(r["family"] for r in lines):
-        spent = _seconds([r for r in lines if r["family"] == name])
-        rows.append([name, len(spent), _spread(spent)])
+        spent = cpu_seconds([r for r in lines if r["family"] == name])
+        rows.append([name, len(spent), spread(spent)])
     heads = ["family", "cases", "processor seconds: median / nine tenths / longest"]
     text = ["## Time", "", *table(heads, rows), ""]
     steps: dict[str, list[float]] = defaultdict(list)

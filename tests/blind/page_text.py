@@ -34,6 +34,7 @@ base model, nothing else. Each verdict is stored completely, one JSON line a cas
 | `numpy` | own equations and fourth-order integrator (NumPy, Numba), a controller in the loop | nothing |
 | `mujoco` | a drive in MuJoCo 4, a controller in the loop | nothing |
 | `toothed` | hdsim's own toothed drive seen from a `lumped` base: its gap is hidden | the simulator |
+| `teeth` | the same from a base with other teeth: a changed gap or one tooth is hidden | the simulator |
 | `real` | recordings of real joints (Kinova Gen3, NEURA LARA8) into which an effect is injected | nothing |
 
 **Calibration and test cases.** Odd seeds are test cases: no rule of the diagnosis has been calibrated on
@@ -86,7 +87,9 @@ effects), *nothing* includes a parameter that is reported as wrong. A false alar
 where nothing is hidden or a parameter is wrong. A diagnosis that stops with an error is wrong. The reducible
 held-out residual is the part beyond the sensors' errors; in the `toothed` family
 beyond what the plant itself leaves when its motor is moved as the log tells: a load that rattles in its play
-rests where the last bounce left it, which no log has.
+rests where the last bounce left it, which no log has. In the `teeth` family a tooth is found where the named
+one is on the right spline and within two of the one out of place or of its opposite (both lobes press alike);
+the true half-gap is the mean of the plant's own flanks.
 
 A recording has effects of its own. Of its effects those count as new that are not identified without the
 injected one and that its source does not list. The stated confidence is that of the first new one or of the

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from contract import Case, Measured
 from judging import borne_out, closed, covered, false_alarm, false_name, outcome, stated
-from page import band, page, rate
+from page import page
+from page_tables import band, rate
 from reliability import binned, calibration_error, picture
 from running import Task, lines_of, stored
 
