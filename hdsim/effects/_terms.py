@@ -124,7 +124,8 @@ class Amplitude(Term):
     """Fields that grow in proportion to one coefficient.
 
     Args:
-        units: field to its value at coefficient 1.
+        units: field to its value at coefficient 1; negative where the effect is not odd in it, and its two
+            signs are two ways of fitting.
         signed: the coefficient may be negative.
         of_range: the units are parts of a range that the record covers: ``twist_arcmin``, if any.
         play: the units are the width of a play in series with the drive's spring. Its trace beside the
@@ -148,10 +149,10 @@ class Amplitude(Term):
         """From the fields' own limits; where they bound both signs, a negative coefficient has one too."""
         least, most = super().bounds(limits)
         for path, unit in self.units.items():
-            low, high = limits(path)
-            most = min(most, (1.0 - INSIDE) * high / unit)
+            low, high = sorted(limit / unit for limit in limits(path))
+            most = min(most, (1.0 - INSIDE) * high)
             if self.signed:
-                least = max(least, (1.0 - INSIDE) * low / unit)
+                least = max(least, (1.0 - INSIDE) * low)
         return least, most
 
     def write(self, data: Settings, c: Values, orders: Values, before: dict[str, float]) -> None:
@@ -177,7 +178,8 @@ class Amplitude(Term):
         half = 2.0 * math.sqrt(max(float(covariance[0, 0]), 0.0))
         low = c[0] - half if self.signed else max(c[0] - half, 0.0)
         for path, unit in self.units.items():
-            found[path] = Ranged(unit * c[0], unit * low, unit * (c[0] + half))
+            ends = sorted((unit * low, unit * (c[0] + half)))
+            found[path] = Ranged(unit * c[0], *ends)
 
 
 @dataclass(frozen=True)

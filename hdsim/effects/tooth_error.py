@@ -51,7 +51,8 @@ class ToothError(Effect):
     of_teeth: ClassVar[OfTeeth | None] = OfTeeth("tooth", "place")
     fittings: ClassVar[tuple[Fitting, ...]] = tuple(
         Fitting(
-            (Amplitude({"shift_um": 10.0}, signed=True),),
+            # Forward it takes load from its neighbours at one sign of the torque, backward at the other.
+            (Amplitude({"shift_um": shift_um}),),
             shapes=(Shape("tooth", _PLACES, linear=True, over_range=f"{member}_pitch_deg"),),
             settings={"member": member},
             label=f"of the {member.replace('_', ' ')}",
@@ -59,6 +60,7 @@ class ToothError(Effect):
             mesh="toothed",
         )
         for member in ("flexspline", "circular_spline")
+        for shift_um in (10.0, -10.0)
     )
 
     member: Literal["flexspline", "circular_spline"] = "flexspline"
