@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hdsim.effects._fitting import Plausible
+from hdsim.effects._fitting import Fitting, Plausible
 from hdsim.kernel import MOTOR_ANGLE, MOTOR_TORQUE, MOTOR_VELOCITY, SUPPLIED, element
 from hdsim.parts import Builder, Effect, Parameters, Signature
 
@@ -93,6 +93,8 @@ class ResonantTorqueRipple(Effect):
             "in the transmission error",
         },
     )
+    fittings: ClassVar[tuple[Fitting, ...]] = ()
+
     components: tuple[ResonantComponent, ...] = Field(
         (ResonantComponent(order=12, amplitude_nm=0.005),), min_length=1
     )
