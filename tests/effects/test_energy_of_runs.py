@@ -49,7 +49,7 @@ def drawn(name: str, scales: dict[str, float], rng: np.random.Generator) -> Any:
             continue  # two ways of saying one number
 
 
-def run_of(seed: int) -> Run:
+def run_of(seed: int, rtol: float = 1e-9) -> Run:
     """A motor let go at speed on a drive with two to six effects and a load."""
     rng = np.random.default_rng([17, seed])
     drive = Drive.model_validate({"preset": "csg-20-100", "mesh": {"model": "lumped"}})
@@ -62,9 +62,8 @@ def run_of(seed: int) -> Run:
         load_inertia_kg_m2=float(np.exp(rng.uniform(np.log(0.01), np.log(5.0)))),
     )
     speed = float(rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(np.log(1.0), np.log(300.0))))
-    # A step across a play's corner errs by about 1e3 times the tolerance: no leak of the account.
     y0 = model.initial_state(motor_velocity=speed)
-    return Run(model, duration_s=0.1, sample_rate_hz=500.0, rtol=1e-9, y0=y0)
+    return Run(model, duration_s=0.1, sample_rate_hz=500.0, rtol=rtol, y0=y0)
 
 
 @pytest.mark.parametrize("block", range(10))
@@ -74,4 +73,8 @@ def test_the_energy_of_a_thousand_runs_closes_and_no_part_gives_heat_back(block:
         run.record()
         names = [type(part).__name__ for part in run.model.parts]
         assert run.audit.given_back <= 1e-12 * run.audit.exchanged, names
-        assert run.audit.relative < 1e-6, names
+        if run.audit.relative >= 1e-6:
+            # A step across a play's corner errs by 1e3 times the tolerance and falls with it: no leak does.
+            run = run_of(seed, rtol=1e-11)
+            run.record()
+            assert run.audit.relative < 1e-7, names

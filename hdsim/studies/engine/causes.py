@@ -16,7 +16,7 @@ _KINEMATIC = ("kinematic_error", "wave_generator_eccentricity", "output_eccentri
 _HYSTERESIS = ("torsional_hysteresis_maxwell", "torsional_hysteresis_duhem")
 _FRICTION = (
     "input_coulomb_viscous", "stribeck_friction", "lugre_friction", "load_dependent_loss",
-    "load_side_friction", "thermal_friction", "motor_torque_ripple",
+    "load_side_friction", "thermal_friction", "motor_torque_ripple", "resonant_torque_ripple",
 )  # fmt: skip
 #: Damping, as a share of the critical, of the load on the drive once no controller damps it.
 _DAMPING = 0.2
