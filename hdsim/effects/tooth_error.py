@@ -51,16 +51,16 @@ class ToothError(Effect):
     of_teeth: ClassVar[OfTeeth | None] = OfTeeth("tooth", "place")
     fittings: ClassVar[tuple[Fitting, ...]] = tuple(
         Fitting(
-            # Forward it takes load from its neighbours at one sign of the torque, backward at the other.
+            # An early one takes load from its neighbours at the other sign of the torque than a late one.
             (Amplitude({"shift_um": shift_um}),),
             shapes=(Shape("tooth", _PLACES, linear=True, over_range=f"{member}_pitch_deg"),),
             settings={"member": member},
-            label=f"of the {member.replace('_', ' ')}",
+            label=f"of the {member.replace('_', ' ')}, {meets}",
             turns=1.0,
             mesh="toothed",
         )
         for member in ("flexspline", "circular_spline")
-        for shift_um in (10.0, -10.0)
+        for meets, shift_um in (("early", 10.0), ("late", -10.0))
     )
 
     member: Literal["flexspline", "circular_spline"] = "flexspline"
