@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from judging import OUTCOMES, Line, false_alarm, false_name, outcome, said
-from page_tables import BANDS, band, cpu_seconds, rate, spread, table
+from page_tables import BANDS, band, cpu_seconds, rate, requirements, spread, table
 from page_teeth import FAMILY, teeth
 from page_text import HEAD, limits
 from reliability import binned, calibration_error
@@ -40,7 +40,9 @@ def page(lines: Sequence[Line]) -> str:
     stated = [r for r in drawn if states(r)]
     others = [r for r in drawn if not states(r)]
     text = [HEAD, _counts(lines, drawn), ""]
-    text += [*_asked(general(stated), general(others)), "", *teeth(stated, others), *_confidence(stated), ""]
+    text += ["## Requirements", "", "Of all families but `teeth`:", ""]
+    text += requirements(_measures, ASKED, "15 / - / 60", general(stated), general(others))
+    text += ["", *teeth(stated, others), *_confidence(stated), ""]
     for title, of in DIMENSIONS.items():
         text += [*_by(title, of, stated), ""]
     text += [*_bands_of_families(stated), "", *_time(stated), "", *_confusion(stated), ""]
@@ -135,20 +137,6 @@ ASKED = {
     "nine tenths of the reducible held-out residual explained, strength from 3.5": ">= 90 %",
     "true parameter in its 95 % interval": "90 to 98 %",
 }
-
-
-def _asked(stated: Sequence[Line], others: Sequence[Line]) -> list[str]:
-    there = _measures(others)
-    rows: list[list[Any]] = [
-        [what, count, rate(right, count), ASKED.get(what, ""), there[what][1], rate(*there[what])]
-        for what, (right, count) in _measures(stated).items()
-    ]
-    row: list[Any] = ["processor seconds: median / nine tenths / longest"]
-    for own in (stated, others):
-        spent = cpu_seconds(own)
-        row += [len(spent), spread(spent), *(["15 / - / 60"] if own is stated else [])]
-    heads = ["", "cases", "rate (95 % interval)", "required", "calibration cases", "rate there"]
-    return ["## Requirements", "", "Of all families but `teeth`:", "", *table(heads, [*rows, row])]
 
 
 def _confidence(lines: Sequence[Line]) -> list[str]:

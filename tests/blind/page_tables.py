@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,3 +52,33 @@ def spread(spent: Sequence[float]) -> str:
     if not spent:
         return "-"
     return f"{np.median(spent):.0f} / {np.quantile(spent, 0.9):.0f} / {max(spent):.0f}"
+
+
+def requirements(
+    measures: Callable[[Sequence[Line]], dict[str, tuple[int, int]]],
+    required: Mapping[str, str],
+    seconds: str,
+    stated: Sequence[Line],
+    others: Sequence[Line],
+) -> list[str]:
+    """Rates of the stated cases beside what is required, and those of the calibration cases.
+
+    Args:
+        measures: numbers of right ones and of cases, by what is asked.
+        required: by the same; nothing where nothing is.
+        seconds: the required processor time.
+        stated: test cases.
+        others: calibration cases.
+    """
+    there = measures(others)
+    rows: list[list[Any]] = [
+        [what, count, rate(right, count), required.get(what, ""), there[what][1], rate(*there[what])]
+        for what, (right, count) in measures(stated).items()
+    ]
+    own, theirs = cpu_seconds(stated), cpu_seconds(others)
+    rows.append(
+        ["processor seconds: median / nine tenths / longest",
+         len(own), spread(own), seconds, len(theirs), spread(theirs)]
+    )  # fmt: skip
+    heads = ["", "cases", "rate (95 % interval)", "required", "calibration cases", "rate there"]
+    return table(heads, rows)

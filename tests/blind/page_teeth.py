@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from judging import Line, false_alarm, outcome
-from page_tables import BANDS, band, cpu_seconds, rate, spread, table
+from page_tables import BANDS, band, requirements, table
 
 FAMILY = "teeth"
 #: How far from the tooth that is out of place the named one may be, teeth.
@@ -86,17 +85,8 @@ def teeth(stated: Sequence[Line], others: Sequence[Line]) -> list[str]:
     stated, others = ([r for r in lines if r["family"] == FAMILY] for lines in (stated, others))
     if not stated:
         return []
-    there = measures(others)
-    rows: list[list[Any]] = [
-        [what, count, rate(right, count), ASKED.get(what, ""), there[what][1], rate(*there[what])]
-        for what, (right, count) in measures(stated).items()
-    ]
-    row: list[Any] = ["processor seconds: median / nine tenths / longest"]
-    for own in (stated, others):
-        spent = cpu_seconds(own)
-        row += [len(spent), spread(spent), *([""] if own is stated else [])]
-    heads = ["", "cases", "rate (95 % interval)", "required", "calibration cases", "rate there"]
-    text = ["## Against a base with teeth (`teeth`)", "", *table(heads, [*rows, row]), ""]
+    text = ["## Against a base with teeth (`teeth`)", ""]
+    text += [*requirements(measures, ASKED, "", stated, others), ""]
     text += ["Half-gaps that were told, um:", "", *_gaps(stated), ""]
     return [*text, "Teeth that were named, `inf` on the wrong spline:", "", *_teeth(stated), ""]
 
