@@ -109,7 +109,7 @@ def again(
             else:
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
-            own.gain, own.of_lines = names[k].gain, names[k].of_lines
+            own.gain, own.of_lines, own.alike = names[k].gain, names[k].of_lines, names[k].alike
             names[k] = own
         k += 1
     return current

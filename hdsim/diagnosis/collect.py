@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -26,7 +25,8 @@ from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import Refit
-from hdsim.estimate.state import Added, State
+from hdsim.estimate.state import Added
+from hdsim.estimate.unwound import turned_to_zero
 
 #: Places of a stage that are kept.
 PLACES = 12
@@ -62,7 +62,7 @@ def collect(
                 shown[k] or catalogue()[one.name].signature.channels,
                 last,
                 explained if len(found.named) == 1 else one.worth,
-                _own_held(bench, found.fit.state, k, predictions["after"]),
+                _own_held(bench, one, predictions["after"]),
             )
             for k, one in enumerate(found.named)
         ],
@@ -100,11 +100,16 @@ def _stage(stage: Stage) -> StageEvidence:
     )
 
 
-def _own_held(bench: Bench, state: State, k: int, predictions: Sequence[Array]) -> HeldOutEvidence | None:
-    """What held-out data say of one effect beside all others."""
-    less = replace(state, added=(*state.added[:k], *state.added[k + 1 :]))
+def _own_held(bench: Bench, one: Named, predictions: Sequence[Array]) -> HeldOutEvidence | None:
+    """What held-out data say of one effect of several, against all others fitted without it.
+
+    The numbers of the others are fitted anew: those that were fitted beside it are wrong without it, and
+    nearly any effect would mend that.
+    """
+    if one.less is None:
+        return None
     try:
-        without = bench.predict(less, everything=True)
+        without = turned_to_zero(bench, one.less.state)
     except PredictionError:
         return None
     return _held(bench, {"refit": without, "after": predictions})

@@ -1,4 +1,4 @@
-"""Step 8 for ``unknown``: the curve over a coordinate that explains best what is left, as a ``table`` effect.
+"""Step 8, what has no name: the curve over a coordinate that explains it best, as a ``table`` effect.
 
 The values follow from penalised least squares, whose roughness is the one that predicts left-out blocks of
 time best, so that noise draws no curve. What the model's own numbers or the sensors' offsets explain is left
@@ -23,9 +23,14 @@ from hdsim.diagnosis.screen import Residual
 from hdsim.effects.table import COORDINATE_UNITS
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
+from hdsim.estimate.found import Gap
+from hdsim.estimate.prove import borne_out, gaps
 from hdsim.estimate.records import Array
+from hdsim.estimate.refit import align
 from hdsim.estimate.state import Added, State
 
+#: Part of a curve's promise that held-out data must show: nearer to all of it than to none.
+HALF = 0.5
 #: Corners of a curve, and of a curve over a period.
 CORNERS, ROUND_CORNERS = 14, 12
 #: Least cross-validated share of the weighed residual that a curve must explain to be offered.
@@ -132,6 +137,24 @@ def fit_curve(
     unit = unit_of(fit.state, kind)
     low, high = unit * (coefficients - 2.0 * spread), unit * (coefficients + 2.0 * spread)
     return CurveFit(kind, at, unit * coefficients, low, high, share, tried, fitted)
+
+
+def proved(bench: Bench, without: Fit, curve: CurveFit) -> dict[str, Gap] | None:
+    """Held-out gaps of a model without (``refit``) and with a curve (``after``).
+
+    Args:
+        bench: the measured series.
+        without: the model.
+        curve: its curve.
+
+    Returns:
+        By channel; None where held-out data do not bear the curve out.
+    """
+    align(bench, curve.fit)
+    found, there = gaps(bench, {"before": without.state, "refit": without.state, "after": curve.fit.state})
+    slope, _ = borne_out(bench, there)
+    align(bench, without)
+    return found if slope >= HALF else None
 
 
 def corners(

@@ -5,11 +5,13 @@ Each corner's unit curve is simulated once in the re-fitted model; its change of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from hdsim.diagnosis.candidate_fits import power_of_sample
 from hdsim.diagnosis.curve_kinds import Kind, sign_of, values_of
 from hdsim.diagnosis.penalised import UNSEEN, Penalised
 from hdsim.diagnosis.screen import Residual
@@ -127,7 +129,12 @@ def solved(
     chosen: tuple[float, State, list[Array], Array] | None = None
     rest = bench.stacked(bench.residuals(fit.predictions))
     # Delays stay where they are: nothing bounds them here.
-    own = fit.columns[:, : len(fit.frees)] * np.array([not free.step for free in fit.frees])
+    moving = np.array([not free.step for free in fit.frees], dtype=float)
+    own = np.hstack([fit.columns[:, : len(fit.frees)] * moving, bench.offset_columns()])
+    # What the data hardly tell stays where priors have it.
+    strict = np.array([1.0 / free.prior for free in fit.frees]) * math.sqrt(power_of_sample(bench, rest))
+    priors = np.hstack([np.diag(strict), np.zeros((len(theta), own.shape[1] - len(theta)))])
+    centre = np.array([free.none for free in fit.frees]) - fit.theta
     for _ in range(2):
         step = found.inverse @ (right - found.penalty @ coefficients)
         coefficients = coefficients + step
@@ -136,11 +143,9 @@ def solved(
             even = np.interp(np.linspace(at[0], at[-1], FINE), at, coefficients)
             coefficients = coefficients - np.median(even)
         # The model's own numbers take their part again.
-        moved, *_ = np.linalg.lstsq(
-            np.hstack([own, bench.offset_columns()]), rest - columns @ step, rcond=1e-6
-        )
-        # What the data hardly tell is not carried away.
-        theta = np.clip(theta + moved[: len(theta)], -2.0, 2.0)
+        aim = np.concatenate([rest - columns @ step, strict * (centre - theta)])
+        moved, *_ = np.linalg.lstsq(np.vstack([own, priors]), aim, rcond=1e-6)
+        theta = theta + moved[: len(theta)]
         state = scaled(fit.state, fit.frees, theta.tolist())
         state = replace(
             state, added=(*state.added, replace(added, coefficients=tuple(coefficients.tolist())))

@@ -121,6 +121,8 @@ def values_of(bench: Bench, state: State, kind: Kind, index: int, residuals: Seq
     predictor = bench.predictors[series.record]
     if kind.coordinate == "motor_angle":
         return np.asarray(predictor.motor_angle)
+    if kind.coordinate == "twist" and predictor.plan.locked:
+        return np.asarray(predictor.motor_angle / predictor.ratio)
     known: dict[str, Array] = coordinates(bench, series, residuals)
     if kind.coordinate == "motor_velocity":
         return known["velocity"]

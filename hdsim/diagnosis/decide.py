@@ -14,6 +14,9 @@ from hdsim.diagnosis.evidence import Evidence, HeldOutEvidence
 from hdsim.diagnosis.rules import RULES, Rules
 from hdsim.estimate.found import Part
 
+#: Standard errors by which a slope must be below a half for held-out data to be predicted worse for certain.
+WORSE = 2.0
+
 Kind = Literal["nothing", "parameter", "effect", "unknown"]
 
 
@@ -161,7 +164,13 @@ def _repeats(held: HeldOutEvidence, rules: Rules) -> bool:
 
 
 def _held(held: HeldOutEvidence, rules: Rules) -> float:
-    """Log odds of "all of the promised change is there" against "none is", by its held-out slope."""
+    """Log odds of "all of the promised change is there" against "none is", by its held-out slope.
+
+    Below a half the effect makes the residual of held-out data larger: where that is no chance (two standard
+    errors), it is all against it.
+    """
+    if held.slope + WORSE * held.spread < 0.5:
+        return -rules.held_against
     variance = held.spread**2 + rules.held_mismatch**2
     odds = (2.0 * held.slope - 1.0) / (2.0 * variance)
     return float(min(max(odds, -rules.held_against), rules.held_for))

@@ -67,6 +67,8 @@ class Named:
         gain: part of the first pass's structure that it explained; set by the search.
         needed: part of what would be missing without it that it explains, beside all others; likewise.
         worth: power that it explains beside all others; likewise, where there are others.
+        less: the model without it, all the rest fitted anew; likewise.
+        alike: names of which either alone explains nearly all that both do; set when they are revised.
     """
 
     name: str
@@ -83,6 +85,8 @@ class Named:
     of_lines: float = 0.0
     needed: float = 1.0
     worth: float = 0.0
+    less: Fit | None = None
+    alike: frozenset[str] = frozenset()
 
 
 def name_effect(

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
-from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.name import MISMATCH, Named, confusable
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit, at_present, fit, settled
@@ -52,17 +53,63 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
                         rest = settled(bench, rest)
                     one.needed = needed(bench, rest, current)
                 one.worth = bench.power(rest.predictions) - bench.power(current.predictions)
+            one.less = rest
             others.append(rest)
         k = min(range(len(named)), key=lambda k: named[k].needed)
         left_out = others[k]
         if left_out is None or named[k].needed >= NEEDLESS:
-            break
+            alike = stand_ins(bench, current, named, others)
+            if alike is None:
+                break
+            kept, k = alike
+            left_out = others[k]
+            assert left_out is not None
+            named[kept].alike |= {named[kept].name, named[k].name, *named[kept].group, *named[k].group}
         del named[k]
         # What the others make up for it takes them a few more steps.
         current = together(bench, left_out)
     if len(named) == 1:
-        named[0].needed = 1.0
+        named[0].needed, named[0].less = 1.0, None
     return current
+
+
+def stand_ins(
+    bench: Bench, current: Fit, named: Sequence[Named], others: Sequence[Fit | None]
+) -> tuple[int, int] | None:
+    """Two names of which either alone explains nearly all that both do: one effect.
+
+    No formula is exact to more than ``MISMATCH`` of what it explains. Where the other name takes up no more
+    than that, whichever of the two is left out, it is no effect beside it but another formula of the same.
+
+    Args:
+        bench: the measured series.
+        current: the model with all names.
+        named: in the order of ``current.state.added``.
+        others: the model without each.
+
+    Returns:
+        Which of the names stays, and which is an alternative to it, as their numbers; None where there are no
+        such two.
+    """
+    whole = bench.power(current.predictions)
+    for j, k in combinations(range(len(named)), 2):
+        less_j, less_k = others[j], others[k]
+        if named[j].name == named[k].name or not confusable(named[j].name, named[k].name):
+            continue
+        if less_j is None or less_k is None:
+            continue
+        neither = without(bench, less_k, j)
+        if neither is None:
+            continue
+        both = bench.power(neither.predictions) - whole
+        lacks = {j: bench.power(less_k.predictions) - whole, k: bench.power(less_j.predictions) - whole}
+        if max(lacks.values()) > MISMATCH * both:
+            continue
+        # A law at the end of its range stands for one that it is not.
+        ends = {j: less_k.state.added[j].at_limit, k: less_j.state.added[k - 1].at_limit}
+        kept = min((j, k), key=lambda one: (ends[one], lacks[one]))
+        return kept, j + k - kept
+    return None
 
 
 def without(bench: Bench, current: Fit, k: int) -> Fit | None:

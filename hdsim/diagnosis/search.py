@@ -103,6 +103,8 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
             found.fit = together(bench, asked)
             found.fit = revised(bench, found.fit, found.named, tell)
         for one in found.named:
+            if one.name in one.alike:
+                one.group = dict.fromkeys(sorted(one.alike - {one.name}), 1.0) | one.group
             for other in found.named:
                 one.group.pop(other.name, None)  # what is there by itself is no other name of this
         # What is left is what this fit leaves, not the rough one before it.

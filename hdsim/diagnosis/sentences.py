@@ -6,22 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hdsim.diagnosis.decide import Decision
-from hdsim.diagnosis.evidence import Evidence, PlaceEvidence
+from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.locate import SHARP
 from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.remainder import remainder
-from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.search import Stage
-from hdsim.diagnosis.verdict import IdentifiedEffect, Located, Verdict
+from hdsim.diagnosis.verdict import IdentifiedEffect, Located, Remains, Verdict
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, added_spreads
 from hdsim.estimate.found import ParameterEstimate
 from hdsim.estimate.numbers import Interval
 from hdsim.estimate.write import fitted_numbers
-
-#: Least part of the structure that is said to follow another shape than its law's.
-LEAST_REST = 0.02
 
 
 def without_a_name(stages: Sequence[Stage], evidence: Evidence, common: Mapping[str, Any]) -> Verdict:
@@ -55,22 +51,12 @@ def without_a_place(bench: Bench, last: Fit, common: Mapping[str, Any]) -> Verdi
     )
 
 
-def other_shape(evidence: Evidence) -> tuple[float, PlaceEvidence] | None:
-    """Share of the systematic residual left by the search, and its regressor; None where it may be chance."""
-    places = evidence.stages[-1].places if evidence.stages else []
-    left = 1.0 - evidence.explained
-    if evidence.left_chance > RULES.chance or left < LEAST_REST or not places:
-        return None
-    return left, places[0]
-
-
-def rest_words(evidence: Evidence) -> str:
-    """What the names leave, with its place; nothing where it may be chance."""
-    rest = other_shape(evidence)
-    if rest is None:
+def rest_words(remains: Remains | None) -> str:
+    """What the names leave, with what it depends on; nothing where it may be chance."""
+    if remains is None:
         return ""
-    coordinate = rest[1].coordinate.replace("_", " ")
-    return f" {100 * rest[0]:.0f} % of the systematic residual remains, a function of the {coordinate}."
+    coordinate = remains.coordinate.replace("_", " ")
+    return f" {100 * remains.share:.0f} % of the systematic residual remains, a function of the {coordinate}."
 
 
 def numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:

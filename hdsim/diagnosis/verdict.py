@@ -68,6 +68,15 @@ class Remainder(Part):
     """Its end."""
 
 
+class Remains(Part):
+    """What identified effects leave of the systematic residual, more than chance would."""
+
+    share: float
+    """Part of the re-fitted model's systematic residual."""
+    coordinate: str
+    """Regressor that it depends on most."""
+
+
 class TeethFound(Part):
     """What the named effects mean in the drive's teeth."""
 
@@ -119,7 +128,9 @@ class Verdict(Part):
     """Effects of the catalogue that could not be tested, with the reason."""
     curve: CurveFound | None = None
     """The residual as a curve over the regressor that explains it best: for ``unknown`` all of it, and part
-    of the scenario; beside identified effects what they do not explain, and not part of the scenario."""
+    of the scenario; beside identified effects what they do not explain (see ``scenario_with_curve``)."""
+    remains: Remains | None = None
+    """Beside identified effects: what they leave, where it is more than chance."""
     remainder: Remainder | None = None
     """For ``unknown``: a residual that depends on no regressor, as what happens once."""
     because: list[Reason] = []
@@ -131,6 +142,9 @@ class Verdict(Part):
     """What the named effects mean in the drive's teeth, where they say anything of them."""
     scenario: str | None = None
     """The scenario that extends the base with the result."""
+    scenario_with_curve: str | None = None
+    """Beside identified effects: the scenario that has the curve of what they leave, too, where held-out data
+    bear it out."""
     readings: int = 1
     """Successive readings whose means were compared, of the record that was read fastest; all numbers, gaps
     and their noise are of these means."""

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from hdsim.diagnosis.collect import collect
-from hdsim.diagnosis.curve import CurveFit, fit_curve
-from hdsim.diagnosis.decide import decide
+from hdsim.diagnosis.curve import CurveFit, fit_curve, proved
+from hdsim.diagnosis.decide import Decision, decide
 from hdsim.diagnosis.discrepancy import discrepancy
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.growth import tracked
 from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.remains import remains, taken_back
 from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.search import Search, Stage, search
 from hdsim.diagnosis.sentences import (
@@ -36,15 +38,15 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Check
 from hdsim.estimate.drift import drifted
 from hdsim.estimate.fit import Fit, base_intervals
-from hdsim.estimate.found import DataProblem
+from hdsim.estimate.found import DataProblem, Gap
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
 from hdsim.estimate.plan import LoadSource
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.prove import borne_out, gaps
+from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Array, Record
-from hdsim.estimate.refit import Refit, refit, tie, together
+from hdsim.estimate.refit import Refit, align, refit, tie
 from hdsim.estimate.repeat import with_repeats
 from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.state import State, state_of
@@ -55,9 +57,6 @@ from hdsim.estimate.write import scenario_changes
 if TYPE_CHECKING:
     from hdsim.recording import Recording
     from hdsim.scenario import Scenario
-
-#: Part of a curve's promise that held-out data must show: nearer to all of it than to none.
-HALF = 0.5
 
 
 @dataclass
@@ -74,6 +73,7 @@ class Diagnosis:
     final: Fit
     start: State
     predictions: dict[str, list[Array]] = field(default_factory=dict)
+    with_curve: Fit | None = None
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -177,33 +177,47 @@ def _diagnosed(
 
     with running:
         found = search(bench, base.fit, during)
-    states = {"before": start, "refit": base.fit.state, "after": found.fit.state}
     with step("prove", "validating on held-out data"):
-        gap, predictions = gaps(bench, states)
-    evidence = collect(bench, base, found, gap, predictions)
-    decision = decide(evidence)
-    current, named = found.fit, [found.named[k] for k in decision.names]
-    if len(named) < len(found.named):
-        # What is not believed is not in the model either.
-        current = _only(bench, base, found, decision.names)
+        judged = _judged(bench, base, found, start)
+    whole = found, judged
+    with running:
+        while len(judged.decision.names) < len(found.named) and len(found.named) > 1:
+            # What is not believed is not in the model either, and the others are judged without it.
+            tell_of = during("again", "taking back what is not believed")
+            least = min(range(len(found.named)), key=judged.decision.confidence.__getitem__)
+            found = taken_back(bench, found, least, tell_of)
+            less = _judged(bench, base, found, start)
+            less.of_others(judged)
+            judged = less
+    if not (judged.decision.names or whole[1].decision.names):
+        found, judged = whole  # of several names that are none, what they explain together says most
+    evidence, decision, gap, predictions = judged.evidence, judged.decision, judged.gap, judged.predictions
+    named = found.named if decision.names else []
+    current = found.fit if decision.names else base.fit
     unknown = decision.kind == "unknown"
     curve: CurveFit | None = None
+    with_it: dict[str, Gap] | None = None
     place = (found.stages[0] if unknown else found.stages[-1]).location
     with step("prove", "asking what is left and the zeros of the records"):
         lacks = evidence.left_chance <= RULES.chance
         current = drifted(bench, current, discrepancy(bench, current, place) if lacks else None)
-    if unknown or (named and evidence.left_chance <= RULES.chance):
+    if unknown or (named and lacks):
         # What has no name, or what the names leave of their own, is a curve.
         with step("curve", "fitting the curve of the unidentified effect"):
             curve = fit_curve(bench, current, place, on_step=tell)
-    if unknown and curve is not None:
+    if curve is not None:
         with step("prove", "validating on held-out data"):
-            _, there = gaps(bench, states | {"after": curve.fit.state})
-            curve = curve if borne_out(bench, there)[0] >= HALF else None
-        current = curve.fit if curve is not None else current
+            with_it = proved(bench, current, curve)
+            if unknown and with_it is not None:
+                current = curve.fit
+                align(bench, current)
+            elif unknown:
+                curve = None
     if current is not found.fit:
         with step("prove", "validating on held-out data"):
-            gap, predictions = gaps(bench, states | {"after": current.state})
+            gap, predictions = gaps(bench, {"before": start, "refit": base.fit.state, "after": current.state})
+    if with_it is not None and named:
+        gap = {c: g.model_copy(update={"with_curve": with_it[c].after}) for c, g in gap.items()}
     with step("orders", "tracking orders over speed"):
         orders = tracked(bench, current.state, [stage.location for stage in found.stages])
     with step("prove", "validating on held-out data"):
@@ -221,6 +235,7 @@ def _diagnosed(
         off = tie(bench, base.before, current, intervals)
         if not off:
             decision.kind = "nothing"
+    rest = remains(evidence) if named else None
     common: dict[str, Any] = {
         "parameters": {i.name: fitted_number(i) for i in intervals},
         "moved": [i.name for i in off],
@@ -231,6 +246,7 @@ def _diagnosed(
         "not_tried": found.stages[0].screening.skipped if found.stages[0].screening else {},
         "confidence": decision.certainty,
         "because": decision.because,
+        "remains": rest,
         "curve": curve.found() if curve is not None else None,
         "readings": readings,
         "short_cut": short_cut_of(bench, current.predictions, predictions["after"]),
@@ -245,9 +261,7 @@ def _diagnosed(
     elif named:
         effects = named_effects(named, decision, current)
         words = " and ".join(effect_words(effect) for effect in effects)
-        # With more added than is believed, the last residual is not that of the believed.
-        rest = rest_words(evidence) if len(named) == len(found.named) else ""
-        sentence = f"The model is missing {words}.{rest}"
+        sentence = f"The model is missing {words}.{rest_words(rest)}"
         teeth = teeth_found(effects, current.state, (bench, current))
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
@@ -258,12 +272,29 @@ def _diagnosed(
     if doubts:
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
-    return Diagnosis(verdict, evidence, checks, bench, base, found.stages, named, current, start, predictions)
+    also = curve.fit if curve is not None and with_it is not None and named else None
+    return Diagnosis(
+        verdict, evidence, checks, bench, base, found.stages, named, current, start, predictions, also
+    )
 
 
-def _only(bench: Bench, base: Refit, found: Search, believed: Sequence[int]) -> Fit:
-    """The model with the believed effects only, fitted anew."""
-    if not believed:
-        return base.fit
-    added = tuple(found.fit.state.added[k] for k in believed)
-    return together(bench, found.fit, replace(found.fit.state, added=added))
+@dataclass
+class _Judged:
+    """What is said of a search's result: held-out gaps, predictions, evidence, decision."""
+
+    gap: dict[str, Gap]
+    predictions: dict[str, list[Array]]
+    evidence: Evidence
+    decision: Decision
+
+    def of_others(self, before: _Judged) -> None:
+        """Keep why a name was taken back, as it was judged before."""
+        own = Counter(law.name for law in self.evidence.laws)
+        gone = {law.name for law in before.evidence.laws if not own[law.name]}
+        self.decision.because += [reason for reason in before.decision.because if reason.of in gone]
+
+
+def _judged(bench: Bench, base: Refit, found: Search, start: State) -> _Judged:
+    gap, predictions = gaps(bench, {"before": start, "refit": base.fit.state, "after": found.fit.state})
+    evidence = collect(bench, base, found, gap, predictions)
+    return _Judged(gap, predictions, evidence, decide(evidence))

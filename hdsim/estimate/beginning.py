@@ -26,18 +26,22 @@ from hdsim.estimate.standstill import resolution, standing
 STRETCHES, EARLY, SAMPLES = 100, 10, 4
 
 
-def hear_beginning(bench: Bench, predictions: Sequence[Array]) -> bool:
+def hear_beginning(bench: Bench, predictions: Sequence[Array], *, first: int = 0) -> bool:
     """Leave out the beginnings of records that leave more than all that follows.
 
     Args:
         bench: the measured series, weighed; their masks are changed.
         predictions: of a model near the data.
+        first: number of the first record that is asked; held-out records come last, and only who proves a
+            model there has its predictions of them.
 
     Returns:
         Whether something was left out.
     """
     residuals, heard = bench.residuals(predictions), False
     for index, predictor in enumerate(bench.predictors):
+        if index < first:
+            continue
         time = predictor.record.time
         if len(time) < SAMPLES * STRETCHES or _at_rest(predictor):
             continue

@@ -35,6 +35,8 @@ class Gap(Part):
     """Of the model with re-estimated parameters."""
     after: float
     """With the identified effects."""
+    with_curve: float | None = None
+    """With the curve of what they leave, too, where held-out data bear it out."""
     noise: float
     """Standard deviation of the channel's noise, from differences of neighbouring readings: no lower bound.
     Slowly varying errors exceed it; a model that predicts a part of them may come below."""

@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Gap
 from hdsim.estimate.records import Array
 from hdsim.estimate.short_cut import whole_models
 from hdsim.estimate.state import State
+from hdsim.estimate.unwound import turned_to_zero
 from hdsim.log.mapping import MEASURED
 
 #: Draws of blocks for the intervals.
@@ -25,7 +27,8 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
         states: the three models.
     """
     with whole_models(bench):
-        predictions = {stage: bench.predict(state, everything=True) for stage, state in states.items()}
+        predictions = {stage: turned_to_zero(bench, state) for stage, state in states.items()}
+    hear_beginning(bench, predictions["after"], first=bench.training)
     residuals = {stage: bench.residuals(found, drift=True) for stage, found in predictions.items()}
     rng = np.random.default_rng(17)
     result = {}

@@ -102,7 +102,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         if not (hear_beginning(bench, before) or hear_beginning(bench, found.predictions)):
             break
         before, found = _roughly(bench, state, freedoms)
-    if hear_standstill(bench, found.state, found.predictions):
+    if hear_standstill(bench, [(found.state, found.predictions), (state, before)]):
         before, found = _roughly(bench, state, freedoms)
     bench.hear_motion(found.state, found.predictions)
     hear_flanks(bench, found.state)

@@ -6,11 +6,13 @@ it is one as far as the speed is known. With Gaussian errors of standard deviati
 erf(v / (sqrt(2) s)), whose slope is that of tanh(v / (sqrt(pi / 2) s)); beyond 2 s the sign is certain.
 
 A model that sticks may stand for a drive that does, or for one that creeps a little before it slips. The data
-say which: the sharper sign is taken where it is clearly likelier while the shaft turns.
+say which: the sharper sign is taken where it is clearly likelier while the shaft turns. A fit under the wrong
+one bends friction to make up for it, so each is judged by the better of the fitted model and the one given.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,21 +35,25 @@ BESIDE = 4
 CLEARLY = 5.0
 
 
-def hear_standstill(bench: Bench, state: State, predictions: Sequence[Array]) -> bool:
+def hear_standstill(bench: Bench, models: Sequence[tuple[State, Sequence[Array]]]) -> bool:
     """Take the sign of friction as sharp as the speed is known, where that is clearly likelier.
 
     The motor's torque at rest counts no longer then.
 
     Args:
         bench: the measured series; predictors and masks are changed.
-        state: the model, at fitted numbers.
-        predictions: its predictions.
+        models: the model at fitted numbers and as given, each with its predictions.
 
     Returns:
         Whether it was taken.
     """
-    friction = state.drive.friction
-    if not friction.sticks or max(friction.coulomb_nm, friction.load_coefficient) == 0.0:
+    models = [
+        (state, there)
+        for state, there in models
+        if state.drive.friction.sticks
+        and max(state.drive.friction.coulomb_nm, state.drive.friction.load_coefficient) > 0.0
+    ]
+    if not models:
         return False
     kept = [predictor.smoothing for predictor in bench.predictors]
     for predictor in bench.predictors:
@@ -58,7 +64,7 @@ def hear_standstill(bench: Bench, state: State, predictions: Sequence[Array]) ->
         else np.ones(len(s.train), dtype=bool)
         for s in bench.series
     ]
-    if not _likelier(bench, state, predictions, turning):
+    if not _likelier(bench, models, turning):
         for predictor, smoothing in zip(bench.predictors, kept, strict=True):
             predictor.smoothing = smoothing
         return False
@@ -69,21 +75,39 @@ def hear_standstill(bench: Bench, state: State, predictions: Sequence[Array]) ->
     return True
 
 
-def _likelier(bench: Bench, state: State, predictions: Sequence[Array], turning: Sequence[Mask]) -> bool:
+def _likelier(bench: Bench, models: Sequence[tuple[State, Sequence[Array]]], turning: Sequence[Mask]) -> bool:
     """Whether the predictors' present sign explains the motor's torque clearly better than before."""
-    try:
-        sharper = bench.residuals(bench.predict(state))
-    except PredictionError:
+    smooth = [bench.residuals(there) for _, there in models]
+    sharper = []
+    for state, _ in models:
+        with contextlib.suppress(PredictionError):
+            sharper.append(bench.residuals(bench.predict(state)))
+    if not sharper:
         return False
-    smooth, better = bench.residuals(predictions), 0.0
-    for series, before, now, rows in zip(bench.series, smooth, sharper, turning, strict=True):
-        rows = series.train & rows
-        if series.channel != "motor_torque" or not len(now) or not rows.any():
-            continue
-        before, now = before[rows], now[rows]
-        independent = correlation(now, series.block[rows]) * max(float(np.mean(now**2)), series.noise**2)
-        better += 0.5 * (float(np.sum(before**2)) - float(np.sum(now**2))) / independent
-    return better > CLEARLY
+
+    def against(residuals: Sequence[Array]) -> float:
+        """What the motor's torque has against a model, in units of an independent sample, halved."""
+        total = 0.0
+        for k, rows in turned:
+            rest, like = residuals[k][rows], now[k][rows]
+            independent = correlation(like, bench.series[k].block[rows])
+            total += (
+                0.5
+                * float(np.sum(rest**2))
+                / independent
+                / max(float(np.mean(like**2)), bench.series[k].noise ** 2)
+            )
+        return total
+
+    turned = [
+        (k, s.train & rows)
+        for k, (s, rows) in enumerate(zip(bench.series, turning, strict=True))
+        if s.channel == "motor_torque" and s.record < bench.training and (s.train & rows).any()
+    ]
+    now = min(
+        sharper, key=lambda residuals: sum(float(np.sum(residuals[k][rows] ** 2)) for k, rows in turned)
+    )
+    return min(against(residuals) for residuals in smooth) - against(now) > CLEARLY
 
 
 def resolution(speed: Array, noise: float) -> float:

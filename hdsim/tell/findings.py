@@ -6,18 +6,15 @@ All else in `hdsim.tell` reads these; only `gather` reads a live diagnosis.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hdsim.diagnosis.coordinates import coordinates
-from hdsim.diagnosis.evidence import Evidence, LawEvidence, PlaceEvidence, StageEvidence
+from hdsim.diagnosis.evidence import Evidence, PlaceEvidence, StageEvidence
 from hdsim.diagnosis.rules import RULES
-from hdsim.diagnosis.sentences import other_shape
 from hdsim.diagnosis.verdict import Remainder, Verdict
 from hdsim.estimate.orders import Line, order_lines
 from hdsim.estimate.prove import held_out_gap
@@ -162,58 +159,14 @@ class Findings:
         return min([*chances, *(law.chance for law in self.evidence.laws)], default=1.0)
 
     @property
-    def not_believed(self) -> list[LawEvidence]:
-        """Effects that the search has added and that are not identified, beside the identified ones."""
-        named = Counter(effect.name for effect in self.verdict.effects)
-        found = []
-        for law in self.evidence.laws if named else ():
-            if named[law.name]:
-                named[law.name] -= 1
-            else:
-                found.append(law)
-        return found
-
-    @property
     def unexplained(self) -> float:
-        """Share of the systematic residual that the identified effects do not explain; 0 without one.
-
-        The evidence counts all that the search has added: what only the others explain is unexplained, too.
-        How much that is, held-out data say: the power beyond the noise of all channels, each over its noise.
-        """
-        if not (self.verdict.effects and self.evidence.laws):
-            return 0.0
-        found = 1.0 - self.evidence.explained
-        gaps = [gap for gap in self.verdict.gap.values() if gap.noise > 0.0]
-        if self.not_believed and gaps:
-            first = sum(max((gap.refit / gap.noise) ** 2 - 1.0, 0.0) for gap in gaps)
-            last = sum(max((gap.after / gap.noise) ** 2 - 1.0, 0.0) for gap in gaps)
-            found = max(found, last / first) if first > 0.0 else found
-        return min(found, 1.0)
-
-    @property
-    def other_shape(self) -> tuple[float, PlaceEvidence] | None:
-        """That share and its regressor, where it is significant; None else.
-
-        Where the search has added more than is identified its last residual is not that of the identified.
-        """
-        if self.not_believed or self.unexplained == 0.0:
-            return None
-        return other_shape(self.evidence)
+        """Share of the systematic residual that the identified effects do not explain; 0 without one."""
+        return 1.0 - self.evidence.explained if self.verdict.effects and self.evidence.laws else 0.0
 
     @property
     def left_most(self) -> tuple[str, float]:
-        """The channel with the largest residual relative to its noise, and that ratio; 0 where unknown.
-
-        Where the search has added more than is identified it is the residual of the identified effects alone.
-        """
+        """The channel with the largest residual relative to its noise, and that ratio; 0 where unknown."""
         rest = self.evidence.rest
-        if self.not_believed and self.verdict.gap:
-            each = {
-                channel: gap.after / gap.noise for channel, gap in self.verdict.gap.items() if gap.noise > 0
-            }
-            return max(
-                ((c, v) for c, v in each.items() if math.isfinite(v)), key=itemgetter(1), default=("", 0.0)
-            )
         return (rest.channel, rest.times_noise) if rest and math.isfinite(rest.times_noise) else ("", 0.0)
 
 

@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 
 #: Name of the scenario of a drive whose teeth have the play that was found.
 TOOTHED = "with teeth that have the play that was found"
+#: The scenario with the curve of what identified effects leave: its file, what it is called, what it says.
+WITH_CURVE = "found_with_curve.yaml"
+CURVED = (
+    "with what was found and a curve",
+    "Written by a diagnosis: the base with parameters estimated from measured data, effects, and a curve.",
+)
 
 
 def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Findings | None = None) -> Path:
@@ -38,14 +44,21 @@ def save(diagnosis: Diagnosis, base: str | Path, out: str | Path, found: Finding
     verdict = diagnosis.verdict
     with staged(out) as stage:
         # What an earlier diagnosis found must not stay beside this one's verdict.
-        for name in ("found.yaml", "next.yaml", "toothed.yaml", "curve.png"):
+        for name in ("found.yaml", WITH_CURVE, "next.yaml", "toothed.yaml", "curve.png"):
             (out / name).unlink(missing_ok=True)
         if verdict.verdict in ("effect", "parameter") or verdict.curve is not None:
             state, freedoms = diagnosis.final.state, diagnosis.refit.freedoms
             text = scenario_text(Path(base).resolve(), state, freedoms, diagnosis.start, out.resolve())
             (stage / "found.yaml").write_text(text, encoding="utf-8")
             verdict.scenario = str(out / "found.yaml")
-            changes = toothed_changes(verdict.effects, state)
+            if diagnosis.with_curve is not None:
+                also = diagnosis.with_curve.state
+                text = scenario_text(
+                    Path(base).resolve(), also, freedoms, diagnosis.start, out.resolve(), CURVED
+                )
+                (stage / WITH_CURVE).write_text(text, encoding="utf-8")
+                verdict.scenario_with_curve = str(out / WITH_CURVE)
+            changes = toothed_changes(verdict.effects, diagnosis.final.state)
             if changes is not None and verdict.teeth is not None:
                 head = {"name": TOOTHED, "extends": "found.yaml"}
                 (stage / "toothed.yaml").write_text(to_yaml(head | changes), encoding="utf-8")

@@ -12,7 +12,7 @@ from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.screen import LEVEL
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.tell.findings import Findings
-from hdsim.tell.tables import numbers_table, section, table
+from hdsim.tell.tables import numbers_table, section, table, with_curve_words
 from hdsim.tell.words import percent, short, short_cut_words, shown, spoken, started, title_of, titles_of
 
 
@@ -99,7 +99,15 @@ def curve(found: Findings, picture: str) -> str:
         if found.unexplained > 0:
             part = f"{percent(found.unexplained)} of the systematic residual of the re-fitted model"
         body = f"<p>{part} does not follow the equation of the identified effect. {what} explains {checked}. "
-        body += "The curve is not part of found.yaml, which holds the identified effects alone.</p>"
+        body += "The curve is not part of found.yaml, which holds the identified effects alone"
+        proved = with_curve_words(found.verdict)
+        if found.verdict.scenario_with_curve:
+            proved += f", as {Path(found.verdict.scenario_with_curve).name}"
+        body += (
+            f"; with it held-out residuals are {proved}.</p>"
+            if proved
+            else ", nor borne out by held-out data.</p>"
+        )
     else:
         body = f"<p>{what} explains {checked}.</p>"
     body += (
@@ -202,6 +210,9 @@ def written(verdict: Verdict, pictures: Collection[str]) -> str:
         what = "the curve as a table effect" if verdict.verdict == "unknown" else "the result"
         rows.insert(2, [Path(verdict.scenario).name, f"the model with {what}; extends your scenario"])
         commands += f"hdsim run {verdict.scenario}    # the model with the result\n"
+    if verdict.scenario_with_curve:
+        name = Path(verdict.scenario_with_curve).name
+        rows.insert(3, [name, "that model with the curve of what the identified effects leave"])
     if verdict.next_experiment is not None and verdict.next_experiment.scenario:
         rows.insert(3, [Path(verdict.next_experiment.scenario).name, "the next experiment"])
         commands += f"hdsim run {verdict.next_experiment.scenario}    # the next experiment\n"

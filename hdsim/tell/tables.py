@@ -29,6 +29,17 @@ def gap_rows(verdict: Verdict) -> list[list[str]]:
     return rows
 
 
+def with_curve_words(verdict: Verdict) -> str:
+    """Held-out residuals with the curve of what the effects leave; empty where it is not borne out."""
+    said = []
+    for channel, gap in verdict.gap.items():
+        if gap.with_curve is not None:
+            unit = unit_of(gap)
+            curved, after = (short(unit.factor * value) for value in (gap.with_curve, gap.after))
+            said.append(f"{curved} instead of {after} {unit.name} ({spoken(channel)})")
+    return ", ".join(said)
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
     """A table as HTML.
 

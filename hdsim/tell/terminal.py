@@ -9,7 +9,7 @@ from hdsim.console import console
 from hdsim.tell.because import conditions, weighings
 from hdsim.tell.beside import baselines, last_model
 from hdsim.tell.findings import Findings
-from hdsim.tell.tables import gap_rows
+from hdsim.tell.tables import gap_rows, with_curve_words
 from hdsim.tell.wording import KINDS, headline, sureness
 from hdsim.tell.words import odds, percent, title_of
 
@@ -108,7 +108,9 @@ def show(found: Findings, terminal: Console | None = None) -> None:
             if why:
                 line((f"{effect.name} or {other}", "bold"), f": {why}")
     if verdict.curve is not None:
-        line(("curve", "bold"), f": {verdict.curve.words}, explains {percent(verdict.curve.share)}")
+        proved = with_curve_words(verdict)
+        said = f"; with it held-out residuals are {proved}" if proved else ""
+        line(("curve", "bold"), f": {verdict.curve.words}, explains {percent(verdict.curve.share)}{said}")
     if verdict.next_experiment is not None:
         line(("next", "bold"), f": {verdict.next_experiment.sentence}")
     for problem in verdict.data_problems:

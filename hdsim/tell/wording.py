@@ -96,10 +96,10 @@ def _missing(found: Findings) -> str:
 
 def other_shape(found: Findings) -> str:
     """The residual of the identified effects, as a sentence; empty where that may be chance."""
-    rest = found.other_shape
+    rest = found.verdict.remains
     if rest is None:
         return ""
-    share, over = percent(rest[0]), spoken(rest[1].coordinate)
+    share, over = percent(rest.share), spoken(rest.coordinate)
     return f" {share} of the systematic residual remains, a function of the {over}."
 
 
@@ -162,9 +162,12 @@ def meaning(found: Findings) -> str:
             "which it occurs again would help."
         )
     said = MEANINGS[verdict.verdict]
-    if verdict.verdict == "effect" and found.other_shape is not None:
+    if verdict.verdict == "effect" and verdict.remains is not None:
+        said += " Its equation is not exact, or something beside it is missing: what remains is shown below"
         said += (
-            " Its equation is not exact: the remaining residual is shown below and not part of found.yaml."
+            " and not part of found.yaml; found_with_curve.yaml has it as a curve."
+            if verdict.scenario_with_curve
+            else " and not part of found.yaml."
         )
     if verdict.teeth is not None:
         said = " ".join([said, *verdict.teeth.sentences])

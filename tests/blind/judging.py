@@ -189,6 +189,7 @@ def closed(
     without: dict[str, Any] | None = None,
     *,
     since: Literal["before", "refit"] = "refit",
+    until: Literal["after", "with_curve"] = "after",
 ) -> float | None:
     """Share of the held-out gap that was closed, of what noise leaves to close.
 
@@ -205,6 +206,7 @@ def closed(
         readings: of the means that were compared.
         without: the verdict's on the recording as it is.
         since: of the gap after the re-fit (what a bent base cannot explain), or of the model's as given.
+        until: the gap with the named effects, or with the curve of what they leave, too, where that was kept.
     """
     best: tuple[float, float] | None = None
     for channel, own in gap.items():
@@ -216,7 +218,9 @@ def closed(
             continue
         excess = own[since] / floor
         if best is None or excess > best[0]:
-            best = (excess, (own[since] - own["after"]) / (own[since] - floor))
+            reached = own.get(until)
+            reached = own["after"] if reached is None else reached
+            best = (excess, (own[since] - reached) / (own[since] - floor))
     return None if best is None else round(best[1], 4)
 
 

@@ -116,6 +116,10 @@ def _measures(lines: Sequence[Line]) -> dict[str, tuple[int, int]]:
     found["nine tenths of the reducible held-out residual explained, strength from 3.5"] = share(
         closable, lambda r: r["closed"] >= CLOSED
     )
+    curved = [r for r in closable if r.get("closed_with_curve") is not None]
+    found["the same with the curve of what the effects leave"] = share(
+        curved, lambda r: r["closed_with_curve"] >= CLOSED
+    )
     given = [r for r in hidden if r.get("closed_since_before") is not None and min(r["strength"]) >= CLEAR]
     found["the same of the residual before the re-fit"] = share(
         given, lambda r: r["closed_since_before"] >= CLOSED

@@ -191,6 +191,7 @@ def _closed(case: Case, verdict: Line, plain: Line | None = None) -> Line:
     return {
         "closed": closed(case, gap, readings, plain),
         "closed_since_before": closed(case, gap, readings, plain, since="before"),
+        "closed_with_curve": closed(case, gap, readings, plain, until="with_curve"),
     }
 
 

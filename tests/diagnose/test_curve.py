@@ -164,3 +164,15 @@ def test_the_penalty_is_large_for_noise_and_small_for_a_sharp_curve():
     assert flat.share < 0.01
     assert np.trace(flat.penalty) > 1e3 * np.trace(sharp.penalty)
     assert np.ptp(flat.values) < 0.03
+
+
+def test_numbers_that_the_data_cannot_tell_apart_stay_by_their_priors_beside_a_curve(tmp_path):
+    """Two that do almost the same: only far apart would they fit a little more of the noise."""
+    bench, fitted, location = prepared(rigid_record(12.0, extra=catch, seed=1), scenario(tmp_path))
+    columns = fitted.fit.columns.copy()
+    columns[:, 1] = columns[:, 0] + 1e-5 * np.random.default_rng(0).standard_normal(len(columns))
+    alike = replace(fitted.fit, columns=columns)
+    found = fit_curve(bench, alike, location)
+    assert found is not None
+    for free, before, after in zip(alike.frees[:2], alike.theta, found.fit.theta, strict=False):
+        assert abs(after - before) < free.prior, free.name
