@@ -102,8 +102,9 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         if not (hear_beginning(bench, before) or hear_beginning(bench, found.predictions)):
             break
         before, found = _roughly(bench, state, freedoms)
-    if hear_standstill(bench, [(found.state, found.predictions), (state, before)]):
-        before, found = _roughly(bench, state, freedoms)
+    sharper = hear_standstill(bench, state, before, found, lambda: _roughly(bench, state, freedoms)[1])
+    if sharper is not None:
+        before, found = bench.predict(state), sharper
     bench.hear_motion(found.state, found.predictions)
     hear_flanks(bench, found.state)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that

@@ -6,14 +6,15 @@ it is one as far as the speed is known. With Gaussian errors of standard deviati
 erf(v / (sqrt(2) s)), whose slope is that of tanh(v / (sqrt(pi / 2) s)); beyond 2 s the sign is certain.
 
 A model that sticks may stand for a drive that does, or for one that creeps a little before it slips. The data
-say which: the sharper sign is taken where it is clearly likelier while the shaft turns. A fit under the wrong
-one bends friction to make up for it, so each is judged by the better of the fitted model and the one given.
+say which: the sharper sign is taken where it is clearly likelier while the shaft turns. A fit under the
+wrong one bends friction to make up for it, so each is judged by a fit of its own.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from hdsim.estimate.covariance import correlation
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import FEWEST_SAMPLES, Array, Mask
 from hdsim.estimate.state import State
+
+if TYPE_CHECKING:
+    from hdsim.estimate.fit import Fit
 
 #: Standard deviations of a speed beyond which its sign is certain (95 %).
 CERTAIN = 2.0
@@ -35,27 +39,28 @@ BESIDE = 4
 CLEARLY = 5.0
 
 
-def hear_standstill(bench: Bench, models: Sequence[tuple[State, Sequence[Array]]]) -> bool:
+def hear_standstill(
+    bench: Bench, given: State, before: Sequence[Array], found: Fit, anew: Callable[[], Fit]
+) -> Fit | None:
     """Take the sign of friction as sharp as the speed is known, where that is clearly likelier.
 
     The motor's torque at rest counts no longer then.
 
     Args:
-        bench: the measured series; predictors and masks are changed.
-        models: the model at fitted numbers and as given, each with its predictions.
+        bench: the measured series, weighed; predictors and masks are changed.
+        given: the model as given.
+        before: its predictions.
+        found: the model fitted.
+        anew: makes a fit like that under the sharper sign.
 
     Returns:
-        Whether it was taken.
+        That fit, where the sharper sign was taken.
     """
-    models = [
-        (state, there)
-        for state, there in models
-        if state.drive.friction.sticks
-        and max(state.drive.friction.coulomb_nm, state.drive.friction.load_coefficient) > 0.0
-    ]
-    if not models:
-        return False
-    kept = [predictor.smoothing for predictor in bench.predictors]
+    friction = given.drive.friction
+    if not friction.sticks or max(friction.coulomb_nm, friction.load_coefficient) == 0.0:
+        return None
+    kept = [(predictor.smoothing, predictor) for predictor in bench.predictors]
+    masks = [(series.train, series.hold, series.sigma) for series in bench.series]
     for predictor in bench.predictors:
         predictor.smoothing = resolution(predictor.motor_velocity, predictor.speed_noise)
     turning = [
@@ -64,50 +69,44 @@ def hear_standstill(bench: Bench, models: Sequence[tuple[State, Sequence[Array]]
         else np.ones(len(s.train), dtype=bool)
         for s in bench.series
     ]
-    if not _likelier(bench, models, turning):
-        for predictor, smoothing in zip(bench.predictors, kept, strict=True):
-            predictor.smoothing = smoothing
-        return False
-    for series, rows in zip(bench.series, turning, strict=True):
-        # Of a record that hardly turns, what it has is better than nothing.
-        if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
-            series.train, series.hold = series.train & rows, series.hold & rows
-    return True
+    with contextlib.suppress(PredictionError):
+        if _matters(bench, before, bench.predict(given), turning):
+            for series, rows in zip(bench.series, turning, strict=True):
+                # Of a record that hardly turns, what it has is better than nothing.
+                if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
+                    series.train, series.hold = series.train & rows, series.hold & rows
+            sharper = anew()
+            if _likelier(bench, found.predictions, sharper.predictions):
+                return sharper
+    for smoothing, predictor in kept:
+        predictor.smoothing = smoothing
+    for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
+        series.train, series.hold, series.sigma = train, hold, sigma
+    return None
 
 
-def _likelier(bench: Bench, models: Sequence[tuple[State, Sequence[Array]]], turning: Sequence[Mask]) -> bool:
-    """Whether the predictors' present sign explains the motor's torque clearly better than before."""
-    smooth = [bench.residuals(there) for _, there in models]
-    sharper = []
-    for state, _ in models:
-        with contextlib.suppress(PredictionError):
-            sharper.append(bench.residuals(bench.predict(state)))
-    if not sharper:
-        return False
+def _matters(bench: Bench, before: Sequence[Array], now: Sequence[Array], turning: Sequence[Mask]) -> bool:
+    """Whether the sharper sign changes the motor's torque by enough to be seen, while the shaft turns."""
+    seen = 0.0
+    for series, one, other, rows in zip(bench.series, before, now, turning, strict=True):
+        if series.channel == "motor_torque" and len(other) and series.noise > 0:
+            seen += 0.5 * float(np.sum(((other - one)[series.train & rows] / series.noise) ** 2))
+    return seen > CLEARLY
 
-    def against(residuals: Sequence[Array]) -> float:
-        """What the motor's torque has against a model, in units of an independent sample, halved."""
-        total = 0.0
-        for k, rows in turned:
-            rest, like = residuals[k][rows], now[k][rows]
-            independent = correlation(like, bench.series[k].block[rows])
-            total += (
-                0.5
-                * float(np.sum(rest**2))
-                / independent
-                / max(float(np.mean(like**2)), bench.series[k].noise ** 2)
-            )
-        return total
 
-    turned = [
-        (k, s.train & rows)
-        for k, (s, rows) in enumerate(zip(bench.series, turning, strict=True))
-        if s.channel == "motor_torque" and s.record < bench.training and (s.train & rows).any()
-    ]
-    now = min(
-        sharper, key=lambda residuals: sum(float(np.sum(residuals[k][rows] ** 2)) for k, rows in turned)
-    )
-    return min(against(residuals) for residuals in smooth) - against(now) > CLEARLY
+def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> bool:
+    """Whether the sharper sign explains the motor's torque clearly better, where that counts."""
+    better = 0.0
+    for series, before, now in zip(
+        bench.series, bench.residuals(smooth), bench.residuals(sharp), strict=True
+    ):
+        rows = series.train
+        if series.channel != "motor_torque" or not len(now) or not rows.any():
+            continue
+        before, now = before[rows], now[rows]
+        independent = correlation(now, series.block[rows]) * max(float(np.mean(now**2)), series.noise**2)
+        better += 0.5 * (float(np.sum(before**2)) - float(np.sum(now**2))) / independent
+    return better > CLEARLY
 
 
 def resolution(speed: Array, noise: float) -> float:
