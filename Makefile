@@ -7,7 +7,7 @@ STAMP  := $(VENV)/installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-fast check setup lock schema picture site blind pythons clean
+.PHONY: help run test test-fast check checked compiled setup lock schema picture site blind pythons clean
 
 help:
 	@echo "make run        simulate the seed drive; the log and the picture go to logs/"
@@ -40,10 +40,17 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-test: check
+# Types take one core, compilation the other; processes side by side would each compile.
+checked: $(STAMP)
+	@$(MAKE) --no-print-directory -j2 check compiled
+
+compiled: $(STAMP)
+	$(BIN)/python tests/compiled.py
+
+test: checked
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10
 
-test-fast: check
+test-fast: checked
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow"
 
 lock:

@@ -95,6 +95,15 @@ def known_load(t, p):
 
 
 @njit(cache=True)
+def known_loads(times, p):
+    """That torque at many times: a call for each would spend its time on handing over the numbers."""
+    found = np.zeros(len(times))
+    for k in range(len(times)):
+        found[k] = known_load(times[k], p)
+    return found
+
+
+@njit(cache=True)
 def rates(t, s, y, torque, p, table, reach, bristle, sliders, twist0, dy, out):
     """The state: motor angle, speed; output; housing; mounted mass (each so); Duhem torque; temperature.
 
@@ -267,7 +276,8 @@ def integrate(angle, speed, motion, start, p, table, reach, gains, log):
             t += h
 
 
-def balance(p: Numbers, angle: float, table: np.ndarray, reach: float) -> np.ndarray:
+@njit(cache=True)
+def balance(p, angle, table, reach):
     """Output angle, housing angle and motor torque at rest under the load, where the log begins."""
     if p.locked:
         return np.zeros(3)

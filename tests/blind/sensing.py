@@ -10,7 +10,7 @@ from contract import Measured
 from drives import LOCKED_SIGN_SPEED, SIGN_SPEED, Drive
 from motions import CONTROL_RATE, reference
 from plant_numbers import Numbers
-from plants import known_load, simulate
+from plants import known_loads, simulate
 from scipy.interpolate import CubicSpline
 
 #: Channels of each set of sensors. ``temperature`` may come on top.
@@ -159,7 +159,7 @@ def readings(p: Numbers, log: np.ndarray) -> dict[str, np.ndarray]:
     joint = joint + p.sensor_ripple * (wave + p.sensor_second * np.sin(2 * p.sensor_order * motor + 0.6))
     # Current times the nominal torque constant: a saturating motor needs more current for its torque.
     torque = p.gain * torque * (1.0 + p.saturation * np.abs(torque) * abs(p.ratio) / p.t2)
-    load = np.array([known_load(t, p) for t in time]) if p.known_a else np.zeros_like(time)
+    load = known_loads(time, p) if p.known_a else np.zeros_like(time)
     return {
         "motor_angle": motor, "motor_torque": torque, "output_angle": output, "output_torque": joint,
         "load_torque": load, "temperature": temperature, "transmission": output - motor / p.ratio,

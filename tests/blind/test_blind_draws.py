@@ -1,5 +1,6 @@
 """Drawn cases: the same from the same numbers, as wide as the page says, with the strength they claim."""
 
+from functools import cache
 from pathlib import Path
 
 import family_numpy as family
@@ -15,6 +16,12 @@ from hdsim.effects import catalogue
 
 #: Quick ones of each kind but the parameter's.
 QUICK = (3, 4, 7)
+
+
+@cache
+def drawn_once(number: int):
+    """The case of seed 0, which more than one test looks at."""
+    return family.draw(number, 0)
 
 
 def wanted(number: int, seed: int):
@@ -82,7 +89,7 @@ def test_setups_stay_within_the_stated_ranges():
 @pytest.mark.slow
 @pytest.mark.parametrize("number", QUICK)
 def test_a_case_follows_from_its_key(number):
-    first = family.draw(number, 0)
+    first = drawn_once(number)
     task = task_of(first.key)
     again = family.draw(task.number, task.seed)
     assert first.key == again.key
@@ -108,7 +115,7 @@ def test_a_case_follows_from_its_key(number):
 @pytest.mark.slow
 def test_a_strength_is_the_one_that_was_reached():
     """By the records themselves, without the sizing: the trace in the channel where it is largest."""
-    case = family.draw(4, 0)
+    case = drawn_once(4)
     asked = wanted_of_draw(4, 0)
     assert case.strength[0] == pytest.approx(asked.strengths[0], rel=0.35)
     assert case.setup["plain_strength"][0] >= case.strength[0]
@@ -139,7 +146,7 @@ def test_a_kept_case_is_the_drawn_one_and_not_drawn_again(tmp_path, monkeypatch)
     again = drawn(task)
     assert again.key == key
     monkeypatch.undo()
-    fresh = drawn(Task("numpy", 7, 0))
+    fresh = drawn_once(7)
     assert again.base == fresh.base
     for one, other in zip(again.records, fresh.records, strict=True):
         assert all(np.array_equal(one.channels[c], other.channels[c]) for c in other.channels)

@@ -9,7 +9,7 @@ from hidden import EFFECTS
 from motions import CONTROL_RATE
 from plant_springs import spring_table
 from sensing import SENSORS, Setup, measure, numbers, readings, truth
-from strength import strength, unresolved
+from strength import plain_strength, unresolved
 
 import hdsim
 from hdsim.effects import catalogue
@@ -184,7 +184,7 @@ def test_the_numbers_to_recover_are_those_of_the_plant(hidden, compared):
     name, label = OWN_NAME.get(hidden.name, (hidden.name, ""))
     expected = hidden.expected(setup.drive, changes)
     effect = catalogue()[name](**settings_of(name, label, expected))
-    trace = strength(setup, changes)
+    trace = plain_strength(setup, changes)
     rest = compared(setup, changes, {name: effect})
     assert trace.plain > 0.1
     # A play turns the zero between the encoders, which is estimated from the log, by a tenth of the noise.

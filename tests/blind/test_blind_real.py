@@ -5,15 +5,11 @@ from dataclasses import replace
 import family_real as family
 import numpy as np
 import pytest
-from contract import AbsentError, Measured
-from real_records import Joint, lara, over_noise, rates, remains
+from contract import Measured
+from real_records import DATA, KINOVA, LARA, Joint, lara, over_noise, rates, remains
 from scipy.ndimage import gaussian_filter1d
 
-try:
-    family.joints()
-    HERE = True
-except AbsentError:
-    HERE = False
+HERE = all((DATA / name).exists() for name in (KINOVA.format(1), KINOVA.format(2), LARA))
 recordings = pytest.mark.skipif(not HERE, reason="the recordings are not here")
 
 
@@ -102,6 +98,7 @@ def test_what_is_known_of_a_joint_is_no_noise_and_what_it_does_beyond_that_is():
         assert np.std(remains(described, read, "motor_torque")) == pytest.approx(np.std(left), rel=0.02)
 
 
+@pytest.mark.slow
 @recordings
 def test_cases_are_the_recording_and_what_was_put_in():
     drawn = [family.draw(n, 1) for n in range(40)]

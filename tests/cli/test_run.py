@@ -90,6 +90,7 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path: Path, capsys: pytest.
     assert any(event.level == "error" for event in recording.events)
 
 
+@pytest.mark.slow
 def test_kill_in_mid_run_leaves_a_log_that_can_be_recovered(tmp_path: Path) -> None:
     scenario = tmp_path / "long.yaml"
     scenario.write_text(SHORT.format(motor="free", duration=100000, rate=2000))

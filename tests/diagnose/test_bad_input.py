@@ -284,6 +284,7 @@ def test_a_record_cannot_be_held_out_and_seen(ask, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_the_real_command_exits_with_2(tmp_path):
     scenario(tmp_path)
     (tmp_path / "no.mcap").write_bytes(b"")

@@ -15,6 +15,7 @@ from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.refit import together
 
 
+@pytest.mark.slow
 def test_an_error_of_the_outputs_encoder_is_nothing_that_a_motors_unbalance_leaves(tmp_path):
     """Both turn with the wave generator; a rotor's weight shows in the motor's torque alone."""
     base = scenario(tmp_path, "lumped")

@@ -66,6 +66,7 @@ def test_what_numbers_of_the_base_can_say_is_held_by_what_was_believed_of_them(o
     assert abs(whole - (WEIGHT + HIDDEN * np.exp(1j * AHEAD))) < 0.03 * WEIGHT
 
 
+@pytest.mark.slow
 def test_effects_that_are_there_move_along(opened):
     bench, base = opened
     _, ripple = candidate(bench, base, "motor_torque_ripple")

@@ -42,6 +42,7 @@ def catch(angle, velocity):
     return 0.03 * np.exp(-(((angle - 70) / 8) ** 2))
 
 
+@pytest.mark.slow
 def test_a_hidden_catch_is_drawn_and_closes_the_gap_on_data_that_no_fit_has_seen(tmp_path):
     base = scenario(tmp_path)
     bench, fitted, location = prepared(rigid_record(12.0, extra=catch, seed=1), base)
@@ -77,6 +78,7 @@ def drift(t):
     return 0.02 * np.sin(2 * np.pi * t / 6.3)
 
 
+@pytest.mark.slow
 def test_a_drift_is_a_curve_over_time_that_begins_with_the_record(tmp_path):
     base = scenario(tmp_path)
     record = rigid_record(12.0, seed=3)
@@ -92,6 +94,7 @@ def test_a_drift_is_a_curve_over_time_that_begins_with_the_record(tmp_path):
     assert gap.after < 0.25 * gap.refit
 
 
+@pytest.mark.slow
 def test_noise_draws_no_curve(tmp_path):
     bench, fitted, location = prepared(rigid_record(8.0, seed=5), scenario(tmp_path))
     assert fit_curve(bench, fitted.fit, location) is None

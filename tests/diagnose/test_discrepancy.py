@@ -42,6 +42,7 @@ def _caught(seed):
     return replace(one, channels=one.channels | {"motor_torque": torque})
 
 
+@pytest.mark.slow
 def test_a_law_that_is_missing_widens_what_it_has_bent(tmp_path):
     found = hdsim.fit([_caught(3)], model(tmp_path), fix=["motor_torque_gain"])
     left, narrow, wide = _asked(found)

@@ -84,6 +84,7 @@ def losses(bench: Bench, fits: dict[str, Fit], turned_deg: float) -> dict[str, f
     return found
 
 
+@pytest.mark.slow
 def test_an_encoders_eccentricity_is_told_from_the_members_by_turning_the_encoder(tmp_path):
     base = base_of(tmp_path)
     hidden = {"output_angle": {"eccentricity_arcmin": 0.1, "eccentricity_phase_deg": 30}}

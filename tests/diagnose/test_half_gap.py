@@ -61,7 +61,8 @@ def fitted(effect: str) -> tuple[Bench, Fit, float]:
     return bench, together(bench, base, state), (1.0 + GROWTH) * own_half_gap(state_of(plant))
 
 
-@pytest.mark.parametrize("effect", ["output_backlash", pytest.param("flank_wear", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", ["output_backlash", "flank_wear"])
 def test_its_interval_holds_the_gap_of_other_flanks_that_wore_otherwise(effect: str) -> None:
     bench, found, true = fitted(effect)
     (added,) = found.state.added
@@ -83,6 +84,7 @@ def test_its_interval_holds_the_gap_of_other_flanks_that_wore_otherwise(effect: 
         assert half_gap_with(of, found.state, interval[1]) < true, "that of the effect alone does not"
 
 
+@pytest.mark.slow
 def test_other_flanks_widen_a_fit_by_what_they_move_it() -> None:
     bench, found, _ = fitted("output_backlash")
     before = np.diag(found.covariance).copy()

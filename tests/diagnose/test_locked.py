@@ -44,6 +44,7 @@ def twisted(tmp_path_factory) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [MOTOR, OUTPUT])
 def test_hysteresis_is_named_from_torque_and_angle_alone(tmp_path, twisted, command):
     """The output twisted against a locked motor, or the other way round: one torque is measured."""

@@ -49,6 +49,7 @@ def at_constant_speed(speed_rad_per_s: float, zero_nm: float = 0.004) -> Record:
     return Record(f"{speed_rad_per_s} rad/s", time, channels)
 
 
+@pytest.mark.slow
 def test_friction_is_what_differs_between_records_at_constant_speed(base):
     learnt = [at_constant_speed(w) for w in (20, -40, 70, -90, 125)]
     held = [at_constant_speed(w) for w in (-30, 50, -80, 110)]

@@ -63,6 +63,7 @@ def test_nothing_is_said_of_data_that_the_model_explains(tmp_path):
     assert found.gap["motor_torque"].after == pytest.approx(2e-3, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "name"), [(stribeck, "stribeck_friction"), (ripple, "motor_torque_ripple")]
 )
@@ -114,6 +115,7 @@ def test_what_happens_once_is_said_with_its_time(tmp_path):
     assert (left.start_s, left.end_s) == pytest.approx((2.2, 2.5), abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_cable_is_no_unbalance_though_that_explains_most_of_it(tmp_path):
     # A weight's torque is a cosine of the output's angle, by statics; what is left there is not its error.
     def cable(angle, velocity):

@@ -68,6 +68,7 @@ def on_screen(bench: Bench, base: Fit, left: Residual, scale: float) -> Screened
     return Screened(MAXWELL, replace(added, coefficients=tuple(share.coefficients)), share, columns)
 
 
+@pytest.mark.slow
 # Without the next minima, or not carried on from there, the torques are 1.3 of 3, 1.0 of 2 N m.
 @pytest.mark.parametrize(("slip_nm", "scale"), [(0.5, 0.5), (1.0, 1.0), (2.0, 1.0), (3.0, 1.0)])
 def test_a_fit_that_begins_at_the_next_minimum_ends_at_the_true_slip_torque(

@@ -22,12 +22,14 @@ def pair(tmp_path_factory):
     return diagnose([rigid_record(extra=hidden)], scenario(folder))
 
 
+@pytest.mark.slow
 def test_both_of_two_hidden_effects_are_named_and_needed(pair):
     assert {effect.name for effect in pair.verdict.effects} >= {"motor_torque_ripple"}
     assert len(pair.verdict.effects) == 2
     assert all(law.needed > 0.9 for law in pair.evidence.laws)
 
 
+@pytest.mark.slow
 def test_a_name_that_nothing_needs_is_taken_back(pair):
     third = next(
         one.added

@@ -53,6 +53,7 @@ def printed(script: str, *arguments: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.slow
 def test_linear_algebra_has_one_thread_in_the_first_fit_of_a_process(tmp_path):
     assert printed(TWICE, str(tmp_path), "fit") == ["{1}"]
 

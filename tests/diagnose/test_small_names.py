@@ -38,6 +38,7 @@ def varying_load(seconds: float = 5.0) -> np.ndarray:
     return np.asarray(18 * np.sin(2 * np.pi * 0.21 * t) + 6 * np.sin(2 * np.pi * 0.53 * t))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "component"),
     [
@@ -67,6 +68,7 @@ def test_friction_over_the_angle_is_told_from_a_ripple_by_turning_round(tmp_path
     assert "position_dependent_friction" not in found.indistinguishable_from
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_falls_with_the_measured_temperature_is_named(tmp_path):
     base = scenario(tmp_path, "lumped")
     load = varying_load()

@@ -57,6 +57,7 @@ def bench_of(effects: dict[str, Any]) -> tuple[Bench, Fit]:
     return bench, fit(bench, state, frees, prune=False, evaluations=4, rough=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("member", "tooth", "shift_um"),
     [("flexspline", 57.0, 12.0), ("circular_spline", 49.0, -25.0)],
@@ -107,6 +108,7 @@ def test_the_tooth_that_is_out_of_place_is_found_on_its_spline(
     assert numbers["shift_um"].value == pytest.approx(shift_um, rel=0.15)
 
 
+@pytest.mark.slow
 def test_what_only_teeth_have_is_asked_of_teeth_alone() -> None:
     bench, base = bench_of({})
     left = Residual(

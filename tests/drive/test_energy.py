@@ -63,6 +63,7 @@ ROUGH = {"engagement": {"kind": "clearance"}, "gap_along_flank": True, "pitch_er
 HEAVY_RING = {"inertia": {"ring_kg_m2": 1e-3}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arrangement", ["circular_spline_fixed", "flexspline_fixed"])
 @pytest.mark.parametrize("ring", ["dynamic", "static"])
 def test_without_losses_the_energy_does_not_drift(arrangement: str, ring: str) -> None:

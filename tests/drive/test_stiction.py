@@ -90,7 +90,10 @@ CASES: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("smoothing", [None, 1e-3], ids=["default", "1e-3"])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [case if case.startswith("slow") else pytest.param(case, marks=pytest.mark.slow) for case in CASES],
+)
 def test_stick_and_slip_at_default_tolerance_are_those_of_radau_at_1e_9(
     case: str, smoothing: float | None
 ) -> None:

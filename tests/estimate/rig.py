@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -48,8 +50,9 @@ def model(tmp_path) -> Scenario:
     return hdsim.load_scenario(path)
 
 
-def record(seed: int, seconds: float = 6.0, *, torque_offset: float = 0.0, name: str = "rig") -> Record:
-    """From rest, a swing with a shake near the resonance, measured with noise."""
+@cache
+def exact(seconds: float) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """From rest, a swing with a shake near the resonance: times, and what sensors without noise read."""
     t = np.arange(round(seconds * RATE)) / RATE
     parts = ((35.0, 2 * np.pi * 0.4), (6.0, 2 * np.pi * 1.3), (0.35, 2 * np.pi * 6.0))
 
@@ -82,6 +85,12 @@ def record(seed: int, seconds: float = 6.0, *, torque_offset: float = 0.0, name:
     angle, speed, acceleration = motion(t)
     friction = coulomb * np.tanh(speed / 0.5) + viscous * speed
     motor = (rotor + WAVE_GENERATOR) * acceleration + friction + torque(angle, speed, *found.y) / RATIO
+    return t, {"motor_angle": angle, "motor_torque": motor, "output_angle": found.y[0]}
+
+
+def record(seed: int, seconds: float = 6.0, *, torque_offset: float = 0.0, name: str = "rig") -> Record:
+    """The swing, measured with noise."""
+    t, ideal = exact(seconds)
     rng = np.random.default_rng(seed)
-    clean = {"motor_angle": angle, "motor_torque": motor + torque_offset, "output_angle": found.y[0]}
-    return Record(name, t, {c: v + NOISE[c] * rng.standard_normal(len(t)) for c, v in clean.items()})
+    clean = ideal | {"motor_torque": ideal["motor_torque"] + torque_offset}
+    return Record(name, t.copy(), {c: v + NOISE[c] * rng.standard_normal(len(t)) for c, v in clean.items()})

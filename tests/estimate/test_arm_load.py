@@ -57,6 +57,7 @@ def test_measured_joints_are_kept_in_a_log(tmp_path):
         assert np.array_equal(again.joints[name], values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [1, 3])
 def test_the_noise_of_other_joints_is_known_as_noise_of_the_load(tmp_path, joint):
     """Drawing them anew changes the load as much as reading them again does (parametric bootstrap)."""

@@ -70,6 +70,7 @@ def test_the_noise_beside_a_gap_is_no_bound_where_errors_last(tmp_path):
     assert gap.noise < 0.5 * gap.regression
 
 
+@pytest.mark.slow
 def test_only_a_black_box_follows_what_is_not_linear(tmp_path, monkeypatch):
     pytest.importorskip("sklearn")
     monkeypatch.setattr("hdsim.estimate.baseline.ROUNDS", 100)

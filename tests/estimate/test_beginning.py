@@ -43,6 +43,7 @@ def measured(begins_s: float) -> Record:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("begins_s", [0.0, 5.0])
 def test_a_vibration_at_the_beginning_bends_no_number(begins_s):
     """In the log at 0; at 5 s in the prediction, which knows nothing of the acceleration before."""

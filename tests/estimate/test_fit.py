@@ -10,6 +10,7 @@ from hdsim.estimate.outcome import FitResult, result_of
 from hdsim.tell.fit_report import save_fit
 
 
+@pytest.mark.slow
 def test_a_bench_numbers_lie_in_their_intervals(tmp_path):
     scenario = model(tmp_path)
     inside, told = 0, 0
@@ -29,6 +30,7 @@ def test_a_bench_numbers_lie_in_their_intervals(tmp_path):
     assert inside >= 0.85 * told  # of 35 at 95 %, 30 or more have a chance of 99 %
 
 
+@pytest.mark.slow
 def test_records_share_numbers_and_may_have_zeros_of_their_own(tmp_path):
     offsets = (0.2, -0.1)
     records = [record(k, 4.0, torque_offset=o, name=f"run {k}") for k, o in enumerate(offsets)]

@@ -52,6 +52,7 @@ def test_a_number_at_its_upper_end_is_asked_from_below(rig):
     assert np.linalg.norm(sensitivities(bench, vector, x)[:, -1]) > 0.0
 
 
+@pytest.mark.slow
 def test_what_is_not_determined_stays_with_later_fits_and_widens_their_intervals(rig):
     bench, state = rig
     found = refit(bench, state).fit
@@ -66,6 +67,7 @@ def test_what_is_not_determined_stays_with_later_fits_and_widens_their_intervals
     assert math.sqrt(alone.covariance[k, k]) < 0.02
 
 
+@pytest.mark.slow
 def test_all_that_was_not_determined_is_asked_again_but_for_a_sensors_sensitivity(rig):
     bench, state = rig
     found = refit(bench, state).fit

@@ -57,6 +57,7 @@ def fitted(record, base):
     return bench, series, rest
 
 
+@pytest.mark.slow
 def test_a_sticking_drive_is_predicted_to_its_noise_while_it_turns(base, record):
     bench, series, rest = fitted(record, base)
     counted = series.train | series.hold
@@ -71,6 +72,7 @@ def creeping(base):
     return base.model_copy(update={"drive": base.drive.model_copy(update={"friction": friction})})
 
 
+@pytest.mark.slow
 def test_a_drive_that_creeps_is_not_taken_for_one_that_sticks(base):
     bench, series, rest = fitted(recorded(creeping(base)), base)
     counted = series.train | series.hold

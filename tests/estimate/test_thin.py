@@ -90,6 +90,7 @@ def test_a_mean_counts_where_half_of_its_readings_do_and_none_spans_a_gap():
     assert not few.trusted["motor_angle"][10]
 
 
+@pytest.mark.slow
 def test_means_keep_the_numbers_and_the_verdict(tmp_path):
     """The same swing of a rigid drive read eight times as fast: the same numbers, within their intervals."""
     sys.path.insert(0, str(Path(__file__).parents[1] / "diagnose"))

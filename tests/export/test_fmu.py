@@ -52,7 +52,8 @@ def scenario() -> Scenario:
     return Scenario.model_validate(SCENARIO)
 
 
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [2, 3])
 def test_an_importer_finds_the_trajectory_of_the_run(fmi: int, scenario: Scenario, tmp_path: Path) -> None:
     out = export_fmu(scenario, tmp_path / f"joint {fmi}.fmu", fmi=fmi)
     assert [path.name for path in tmp_path.iterdir()] == [out.name]

@@ -245,6 +245,7 @@ def test_a_finished_log_is_served_the_same_way(tmp_path):
     assert path.read_bytes() == content
 
 
+@pytest.mark.slow
 def test_commands_serve_and_end_on_interrupt(tmp_path):
     source = tmp_path / "a.yaml"
     source.write_text(scenario(1.0).to_yaml())

@@ -46,6 +46,7 @@ def test_recovering_a_sound_log_loses_nothing(log, recording, tmp_path):
     assert_same(back, recording)
 
 
+@pytest.mark.slow
 def test_a_flipped_byte_anywhere_is_noticed(log):
     size = log.stat().st_size
     rng = np.random.default_rng(5)
@@ -85,6 +86,7 @@ def test_a_damaged_record_length_costs_one_chunk(log, tmp_path, byte):
     assert verify_log(tmp_path / "new.mcap").ok
 
 
+@pytest.mark.slow
 def test_recovery_never_fails_or_invents(log, recording, tmp_path):
     """Bytes changed at random: what comes back is a sound log of rows that were written."""
     whole = log.read_bytes()

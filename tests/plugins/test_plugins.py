@@ -123,6 +123,7 @@ run: {duration_s: 0.05}
 """
 
 
+@pytest.mark.slow
 def test_a_scenario_takes_all_of_them(folder: Path) -> None:
     (folder / "all.yaml").write_text(SCENARIO)
     code = """

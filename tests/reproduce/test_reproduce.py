@@ -105,8 +105,8 @@ def test_a_pattern_chooses_and_a_wrong_one_is_refused():
         compute(["eq-99"])
 
 
-def test_reports_hold_every_row_and_figure(tmp_path):
-    rows = compute(["fig-1*", "eq-21"])
+def test_reports_hold_every_row_and_figure(rows, tmp_path):
+    rows = [row for name, row in rows.items() if name.startswith("fig-1") or name == "eq-21"]
     for form, suffix in (("html", "html"), ("markdown", "md"), ("json", "json")):
         files = write(rows, tmp_path / form, form)
         text = next(f for f in files if f.suffix == f".{suffix}").read_text()

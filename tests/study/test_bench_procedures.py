@@ -310,6 +310,7 @@ def test_approaches_tell_the_sides_apart() -> None:
     assert [(round(math.degrees(one.target), 6), one.direction) for one in found] == [(0.0, -1), (30.0, 1)]
 
 
+@pytest.mark.slow
 def test_every_procedure_draws_a_labelled_picture() -> None:
     short = {
         "transmission_error": {"motor_rpm": 1200.0},

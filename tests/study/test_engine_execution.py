@@ -42,6 +42,7 @@ def test_planted_amplitudes_come_out_run_by_run(tmp_path):
     assert result.table.columns["status"].values == ["ok"] * 4
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_same_table_as_one(tmp_path):
     one = csv_of(run_study(toothed(), tmp_path / "1", workers=1), tmp_path / "1.csv")
     two = csv_of(run_study(toothed(), tmp_path / "2", workers=2), tmp_path / "2.csv")
@@ -191,12 +192,21 @@ def children(pid):
     return [int(line) for line in found.stdout.split()]
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Folder of the study that nobody killed."""
+    folder = tmp_path_factory.mktemp("whole")
+    path = folder / "killed.yaml"
+    path.write_text(STUDY)
+    subprocess.run(command(path, folder / "whole"), check=True, capture_output=True)
+    return folder / "whole"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", ["1", "2"])
-def test_study_killed_at_the_half_goes_on_and_gives_the_identical_table(tmp_path, workers):
+def test_study_killed_at_the_half_goes_on_and_gives_the_identical_table(tmp_path, whole, workers):
     path = tmp_path / "killed.yaml"
     path.write_text(STUDY)
-    subprocess.run(command(path, tmp_path / "whole"), check=True, capture_output=True)
     folder = tmp_path / "killed"
     journal = folder / JOURNAL
     running = subprocess.Popen(command(path, folder, "--workers", workers), stdout=subprocess.DEVNULL)
@@ -215,7 +225,7 @@ def test_study_killed_at_the_half_goes_on_and_gives_the_identical_table(tmp_path
     )
     assert f"{done} of them from before" in again.stdout
     for name in ("results.csv", "results.parquet", "summary.csv", "provenance.json"):
-        assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        assert (folder / name).read_bytes() == (whole / name).read_bytes()
     for pid in workers_left:  # no worker outlives the study that was killed
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)

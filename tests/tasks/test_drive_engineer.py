@@ -137,6 +137,7 @@ def test_the_largest_roughness_for_a_lost_motion_of_an_arcmin(folder: Path) -> N
     assert all(float(row["quantile [arcsec]"]) > 60 for row in beyond)
 
 
+@pytest.mark.slow
 def test_a_metric_of_another_test_is_an_error_of_one_line(folder: Path) -> None:
     arguments = ["--metric", "lost_motion", "--limit", "60", "--replicates", "1"]
     place = ["--parameter", "drive.mesh.gap_factor", "--low", "1", "--high", "2"]

@@ -62,6 +62,7 @@ def test_the_notebook_is_stored_without_outputs() -> None:
     assert [cell.outputs for cell in stored.cells if cell.cell_type == "code" and cell.outputs] == []
 
 
+@pytest.mark.slow
 def test_every_object_is_shown_with_its_numbers_and_a_picture(cells: list[Any]) -> None:
     outputs = [output.data for cell in cells for output in cell.outputs if "data" in output]
     pages = [data["text/html"] for data in outputs if "class='hdsim'" in data.get("text/html", "")]
@@ -72,11 +73,13 @@ def test_every_object_is_shown_with_its_numbers_and_a_picture(cells: list[Any]) 
         assert len(page) < 250_000
 
 
+@pytest.mark.slow
 def test_names_complete(told: dict[str, Any]) -> None:
     assert told["facade"] == ["diagnose"]
     assert told["attributes"] == told["keys"] == ["output_torque"]
 
 
+@pytest.mark.slow
 def test_what_was_hidden_is_found_and_added(told: dict[str, Any]) -> None:
     assert told["named"] == ["position_dependent_friction"]
     found, hidden = told["ripples"]
@@ -87,6 +90,7 @@ def test_what_was_hidden_is_found_and_added(told: dict[str, Any]) -> None:
     assert low < true < high
 
 
+@pytest.mark.slow
 def test_loops_of_ones_own_reach_what_they_should(told: dict[str, Any]) -> None:
     # A heavier load gains less speed from the same torque in the same time.
     first, last = np.abs(told["speeds"])
@@ -96,5 +100,6 @@ def test_loops_of_ones_own_reach_what_they_should(told: dict[str, Any]) -> None:
     assert 0.0 < abs(told["reached"] - 5.0) < 1.2 * held
 
 
+@pytest.mark.slow
 def test_the_study_varied_what_it_was_told(told: dict[str, Any]) -> None:
     assert told["inertias"] == [0.2, 0.5, 1.0]

@@ -11,6 +11,7 @@ from hdsim.diagnosis.verdict import Verdict
 from hdsim.tell.save import save
 
 
+@pytest.mark.slow
 def test_a_group_gets_its_next_experiment_as_a_scenario_that_runs(diagnosis, base, tmp_path):
     own = replace(
         diagnosis.named[0],

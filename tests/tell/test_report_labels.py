@@ -73,6 +73,7 @@ def labels(found, base, tmp_path_factory):
     return seen
 
 
+@pytest.mark.slow
 def test_every_label_of_the_reports_is_in_the_glossary(labels):
     known = terms()
     assert len(labels) > 40
