@@ -20,7 +20,7 @@ from hdsim.estimate.bench import SETTLE_S, Bench
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.predict import Predictor
 from hdsim.estimate.records import Array
-from hdsim.estimate.standstill import resolution, standing
+from hdsim.estimate.standstill import at_rest
 
 #: Stretches of a record, and those of them that may be left out; fewest samples in one of them.
 STRETCHES, EARLY, SAMPLES = 100, 10, 4
@@ -73,8 +73,7 @@ def hear_beginning(bench: Bench, predictions: Sequence[Array], *, first: int = 0
 
 def _at_rest(predictor: Predictor) -> bool:
     """Whether a record begins at rest, as its prediction does: then nothing swings yet."""
-    speed = predictor.motor_velocity
-    slow = standing(speed, resolution(speed, predictor.speed_noise))
+    slow = at_rest(predictor)
     return bool(slow[predictor.record.time - predictor.record.time[0] <= SETTLE_S].all())
 
 

@@ -268,7 +268,7 @@ def _directions(bench: Bench, found: Fit) -> list[Direction]:
     """What the data see of the free numbers at the end of the fit."""
     columns, frees = found.columns[:, : len(found.frees)], [*found.frees, *found.undetermined]
     if found.undetermined:
-        beside = found.beside[0] if found.beside is not None else None
+        beside = found.beside[0][:, : len(found.undetermined)] if found.beside is not None else None
         if beside is None:
             unknown = Vector(found.state, tuple(found.undetermined), 0)
             beside = sensitivities(bench, unknown, unknown.start(), found.predictions)

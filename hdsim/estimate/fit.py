@@ -44,8 +44,8 @@ class Fit:
         columns: sensitivities of the predictions to every free number, whitened, shape (rows, p).
         undetermined: numbers that were left where they were, because the data do not determine them.
         ties: for each undetermined number, those that it cannot be told from.
-        beside: sensitivities to the undetermined numbers, shape (rows, u), and their prior spreads (u,): not
-            knowing them widens the intervals of the others.
+        beside: sensitivities to the undetermined numbers and then to the zeros of locked records, shape
+            (rows, u), and their prior spreads (u,): not knowing them widens the intervals of the others.
     """
 
     state: State

@@ -32,11 +32,14 @@ from hdsim.estimate.zeros import Zero, between_zeros
 if TYPE_CHECKING:
     from hdsim.actuation.arm import Arm
     from hdsim.actuation.signal_data import SignalData
+    from hdsim.drive.model import Model
     from hdsim.drive.parameters import Drive
     from hdsim.parts import Effect
 
 #: Time for which the model runs before the record begins, so that its own oscillation has died away, s.
 LEAD_IN_S = 0.5
+#: Part of the first unbalance that is none, and most of Newton's steps to it.
+BALANCED, BALANCE_STEPS = 1e-6, 20
 #: Name of the torque that a model's output carries, where the sensor's reading is given.
 CARRIED = "carried_torque"
 #: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
@@ -98,12 +101,12 @@ class Predictor:
             carried = self._means.behind(record.filled(plan.load))
             breaks, coefficients = smoothed(record.time, carried, step=step)
             sign = -1.0 if plan.load == "output_torque" else 1.0
-            self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S)
+            self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S, steady=True)
         #: What a part may ask for beside the motion (``Builder.external``).
         self.signals: dict[str, SignalData] = {}
         if "temperature" in record.readable:
             found = smoothed(record.time, record.filled("temperature"))
-            self.signals["temperature"] = signal(*found, LEAD_IN_S)
+            self.signals["temperature"] = signal(*found, LEAD_IN_S, steady=True)
         self._slow: SlowPart | None = None
         if plan.load == "output_torque":
             factor = ratio if plan.motion == "output_angle" else 1.0
@@ -151,6 +154,12 @@ class Predictor:
         """Standard deviation of what the motion's noise does to the motor's speed, rad/s."""
         again = self._moved(np.random.default_rng([0, 11])).motor_velocity
         return float(np.sqrt(np.mean((again - self.motor_velocity) ** 2)))
+
+    @property
+    def angle_noise(self) -> float:
+        """What readings of the prescribed motion differ by from it, root mean square, rad of the motor."""
+        apart = self._factor * self._reading - self.motor_angle
+        return float(np.std(apart))
 
     def _moved(self, rng: np.random.Generator) -> Predictor:
         """The same record with the prescribed motion alone drawn anew."""
@@ -256,6 +265,7 @@ class Predictor:
             raise PredictionError(str(error)) from None
         for side in {"ring", "output"} & set(model.place_of):
             model.system.y0[model.place_of[side]] = self._zero
+        begin_balanced(model)
         self.runs += 1
         asked = dict.fromkeys(self.plan.channels)
         if self._slow is not None:
@@ -275,6 +285,39 @@ class Predictor:
                 own = own - self._slow.of(own) if np.any(own) else own
                 found["output_torque"] = self.slow_torque + own
         return found
+
+
+def begin_balanced(model: Model) -> None:
+    """Let a model begin with ring and output where their torques cancel, if that is found.
+
+    A load that hangs on the drive has wound it up before the record begins. From rest at the ideal gear's
+    angle it would fall into its spring and swing for longer than any lead-in.
+
+    Args:
+        model: its initial state is changed; velocities stay those of the ideal gear.
+    """
+    system = model.system
+    places = np.array([at for name, at in model.place_of.items() if name != "motor"])
+    if not places.size:
+        return
+    y = system.y0.copy()
+    pull = system.rhs(0.0, y)[places + 1].copy()
+    first = float(np.linalg.norm(pull))
+    for _ in range(BALANCE_STEPS):
+        if not first or np.linalg.norm(pull) <= BALANCED * first:
+            system.y0[:] = y
+            return
+        yields = system.jacobian(0.0, y)[np.ix_(places + 1, places)]
+        step, *_ = np.linalg.lstsq(yields, -pull, rcond=None)
+        for part in (1.0, 0.5, 0.25, 0.1):
+            there = y.copy()
+            there[places] += part * step
+            now = system.rhs(0.0, there)[places + 1].copy()
+            if np.linalg.norm(now) < np.linalg.norm(pull):
+                y, pull = there, now
+                break
+        else:
+            return
 
 
 class PredictionError(ArithmeticError):

@@ -17,7 +17,7 @@ from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
 from hdsim.estimate.standstill import hear_standstill
 from hdsim.estimate.state import State
-from hdsim.estimate.unwound import turn_to_zero
+from hdsim.estimate.unwound import turn_to_zero, zeros_beside
 from hdsim.estimate.vector import Vector, sensitivities
 
 #: Part of what the number that can do most alone can do, for another to do as well.
@@ -71,7 +71,8 @@ def tie(bench: Bench, before: Sequence[Array], found: Fit, intervals: Sequence[I
     """
     columns, frees = found.columns[:, : len(found.frees)], list(found.frees)
     if found.beside is not None:
-        columns, frees = np.hstack([columns, found.beside[0]]), frees + found.undetermined
+        there = found.beside[0][:, : len(found.undetermined)]
+        columns, frees = np.hstack([columns, there]), frees + found.undetermined
     if not frees:
         return []
     along = columns.T @ bench.trace(before, found.predictions)
@@ -175,10 +176,16 @@ def _with_those_left(bench: Bench, found: Fit) -> Fit:
 def _widened(bench: Bench, found: Fit) -> None:
     """Let the numbers that the data do not determine widen the intervals of the others."""
     found.beside = None
-    if not found.undetermined or not found.columns.size:
+    if not found.columns.size:
         return
-    unknown = Vector(found.state, tuple(found.undetermined), len(found.state.added))
-    found.beside = sensitivities(bench, unknown, unknown.start(), found.predictions), unknown.priors()
+    columns, sizes = zeros_beside(bench, found.state, found.predictions)
+    if found.undetermined:
+        unknown = Vector(found.state, tuple(found.undetermined), len(found.state.added))
+        own = sensitivities(bench, unknown, unknown.start(), found.predictions)
+        columns, sizes = np.hstack([own, columns]), np.concatenate([unknown.priors(), sizes])
+    if not sizes.size:
+        return
+    found.beside = columns, sizes
     rest = bench.stacked(bench.residuals(found.predictions))
     priors = Vector(found.state, tuple(found.frees), 0).priors()
     found.covariance = robust_covariance(found.columns, rest, bench.stacked_blocks(), priors, found.beside)

@@ -190,20 +190,22 @@ def _jumping(time: Array, values: Array, spline: BSpline, rate: Rate | None) -> 
         return None  # a gap leaves a stretch between knots without samples
 
 
-def signal(breaks: Array, coefficients: Array, lead_in_s: float = 0.0) -> SignalData:
+def signal(breaks: Array, coefficients: Array, lead_in_s: float = 0.0, *, steady: bool = False) -> SignalData:
     """The spline as a signal of the simulation, after a lead-in at its initial slope.
 
     Args:
         breaks: shape (k + 1,), s.
         coefficients: shape (4, k), constant term first.
         lead_in_s: time before the first break, s.
+        steady: lead in at its initial value. A motion goes on at its speed; a torque that is measured with
+            noise has no slope that would hold for long.
     """
     from hdsim.actuation import _signal_kernel as law
     from hdsim.actuation.signal_data import Move, Segment, SignalData, hold
 
     if not np.all(np.isfinite(coefficients)):
         raise InputError("a measured channel cannot be smoothed: it holds values that are not finite")
-    first, slope = coefficients[0, 0], coefficients[1, 0]
+    first, slope = coefficients[0, 0], 0.0 if steady else coefficients[1, 0]
     starts = breaks[:-1] - breaks[0] + lead_in_s
     rows = [tuple(row) for row in coefficients.T.tolist()]
     times = starts.tolist()

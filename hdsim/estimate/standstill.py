@@ -27,9 +27,12 @@ from hdsim.estimate.state import State
 
 if TYPE_CHECKING:
     from hdsim.estimate.fit import Fit
+    from hdsim.estimate.predict import Predictor
 
 #: Standard deviations of a speed beyond which its sign is certain (95 %).
 CERTAIN = 2.0
+#: Standard deviations of an angle's noise that a way must have to be one (chance: 6 in 100,000).
+SEEN = 4.0
 #: Smoothing speed of a sign over the standard deviation of the speed.
 SMOOTHED = float(np.sqrt(np.pi / 2.0))
 #: Samples on either side that count with one of unknown sign: where friction's jump can be seen, the motion's
@@ -64,7 +67,7 @@ def hear_standstill(
     for predictor in bench.predictors:
         predictor.smoothing = resolution(predictor.motor_velocity, predictor.speed_noise)
     turning = [
-        ~standing(bench.predictors[s.record].motor_velocity, bench.predictors[s.record].smoothing)
+        ~at_rest(bench.predictors[s.record])
         if s.channel == "motor_torque"
         else np.ones(len(s.train), dtype=bool)
         for s in bench.series
@@ -122,15 +125,34 @@ def resolution(speed: Array, noise: float) -> float:
     return float(np.clip(SMOOTHED * np.hypot(noise, between), STICKS_RAD_PER_S, RESOLVED_RAD_PER_S))
 
 
-def standing(speed: Array, smoothing: float) -> Mask:
+def at_rest(predictor: Predictor) -> Mask:
+    """Samples of a record at which its motor may rest or reverse, and those next to them, shape (n,)."""
+    speed = predictor.motor_velocity
+    smoothing = resolution(speed, predictor.speed_noise)
+    return standing(speed, smoothing, predictor.motor_angle, SEEN * predictor.angle_noise)
+
+
+def standing(speed: Array, smoothing: float, angle: Array | None = None, least_rad: float = 0.0) -> Mask:
     """Samples at which the shaft may rest or reverse, and those next to them, shape (n,).
+
+    Of a long rest a few samples seem fast by chance, and a spline swings before the jump in speed that ends
+    it, by as much as the readings' noise allows. Between two slow ones the shaft has turned where it has come
+    farther than that.
 
     Args:
         speed: shape (n,), rad/s.
         smoothing: of the sign, ``resolution``, rad/s.
+        angle: of the shaft, shape (n,), rad.
+        least_rad: least way of a turn.
     """
     slow = np.abs(speed) < CERTAIN / SMOOTHED * smoothing
     turned = np.diff(np.sign(speed)) != 0
     slow[1:] |= turned
     slow[:-1] |= turned
+    if angle is not None:
+        edges = np.flatnonzero(np.diff(np.concatenate([[True], slow, [True]]).astype(int)))
+        for first, end in zip(edges[::2], edges[1::2], strict=True):
+            # From the slow sample before to the one behind.
+            if abs(angle[min(end, len(angle) - 1)] - angle[max(first - 1, 0)]) < least_rad:
+                slow[first:end] = True
     return np.convolve(slow, np.ones(2 * BESIDE + 1), "same") > 0

@@ -44,6 +44,25 @@ def turn_to_zero(bench: Bench, state: State, predictions: Sequence[Array]) -> bo
     return True
 
 
+def zeros_beside(bench: Bench, state: State, predictions: Sequence[Array]) -> tuple[Array, Array]:
+    """What stands beside a fit's numbers for the locked records' zeros, which it holds where they are.
+
+    A spring's corner that is passed on one side alone lies elsewhere with another zero of angle and sensor.
+
+    Args:
+        bench: the measured series.
+        state: the fitted model.
+        predictions: what it predicts.
+
+    Returns:
+        Whitened columns, shape (rows, k), and their prior spreads, rad, (k,).
+    """
+    columns = unwound(bench, state, predictions)
+    sizes = [TURN * float(np.ptp(bench.predictors[index].motor_angle)) for index in columns]
+    rows = len(bench.stacked_series())
+    return np.column_stack([np.zeros((rows, 0)), *columns.values()]), np.array(sizes)
+
+
 def unwound(bench: Bench, state: State, predictions: Sequence[Array]) -> dict[int, Array]:
     """Change of the whitened predictions per rad of motor angle at zero torque, by locked record.
 
