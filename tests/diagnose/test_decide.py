@@ -140,3 +140,11 @@ def test_a_later_effect_whose_own_change_held_out_data_do_not_show_is_not_named(
         return decide(found(first, law("sensors", needed=0.9, held=held), held=whole)).confidence[1]
 
     assert confidence(absent) < 0.5 < confidence(there)
+
+
+def test_an_effect_with_which_held_out_data_are_predicted_worse_is_none():
+    """A slope below a half is a larger residual than without it, whatever it explains of training data."""
+    worse = found(law(), explained=0.97, held=HeldOutEvidence(slope=0.29, spread=0.05))
+    assert decide(worse).kind == "unknown"
+    blunt = found(law(), explained=0.97, held=HeldOutEvidence(slope=0.29, spread=0.5))
+    assert decide(blunt).kind == "effect"

@@ -38,7 +38,7 @@ def twisted(seed: int) -> Record:
 
 @pytest.mark.parametrize("turned_rad", [0.0, 2e-4, -1.5e-4])
 def test_a_held_out_locked_record_has_a_zero_of_its_own(turned_rad):
-    """What is told of it before any model is known may be off: each model that is proved there finds it anew."""
+    """What is told of it before any model is known may be off: each model that is proved there finds it."""
     base = Scenario.model_validate(LOCKED)
     bench = bench_for([twisted(1)], [twisted(2)], base, None)
     training, held = bench.predictors

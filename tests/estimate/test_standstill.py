@@ -12,6 +12,7 @@ from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit
 from hdsim.estimate.standstill import resolution, standing
 from hdsim.estimate.state import state_of
+from hdsim.scenario import Scenario
 
 NOISE = {"motor_angle": 8e-6, "motor_torque": 4e-3}
 BASE = """
@@ -118,3 +119,61 @@ def test_rests_and_reversals_take_their_neighbours_along():
     assert not found[:26].any()
     assert not found[56:74].any()
     assert not found[86:].any()
+
+
+def test_of_a_long_rest_no_sample_counts_as_turning():
+    """A speed is beyond two standard deviations in one sample of twenty by chance, and a spline swings."""
+    rng = np.random.default_rng(5)
+    time = np.arange(4000) * 0.001
+    wandering = np.convolve(rng.standard_normal(4100), np.hanning(42)[1:], "valid")[:4000]
+    speed = 1e-3 * wandering / wandering.std()
+    speed[3000:] = 0.05 * (time[3000:] - 3.0)
+    speed[2980:3000] = -4e-3  # as a spline swings before a jump
+    angle = np.cumsum(speed) * 0.001
+    smoothing = 1e-3 * np.sqrt(np.pi / 2.0)
+    assert not standing(speed, smoothing)[:2950].all()
+    found = standing(speed, smoothing, angle, 2e-4)
+    assert found[:3000].all()
+    assert not found[3300:].any()
+
+
+TWISTED = {
+    "drive": {"preset": "csg-20-50", "mesh": {"model": "lumped"}},
+    "command": {"motor": {"type": "free"}, "output": {"type": "locked"}},
+    "load": {"inertia_kg_m2": 0.05},
+    "run": {"duration_s": 1.0},
+}
+
+
+def crept(base: Scenario) -> Record:
+    """A motor that winds up a locked drive slowly, stops, and is held by its Coulomb friction there."""
+    friction, ratio = base.drive.friction, base.drive.ratio
+    time = np.arange(0.0, 12.0, 0.002)
+    # Half a second of way, half a second of rest.
+    phase = np.minimum(np.mod(time, 1.0) / 0.5, 1.0)
+    up = np.where(np.floor(time) % 4 < 2, 1.0, -1.0)
+    way = 0.01 * 0.5 * (1.0 - np.cos(np.pi * phase)) * up
+    angle = np.cumsum(np.diff(way, prepend=0.0) * (phase < 1.0))
+    speed = np.gradient(angle, time)
+    torque = base.drive.torsion.stiffness_k1_nm_per_rad * angle / ratio
+    assert np.abs(torque).max() < base.drive.torsion.torque_t1_nm
+    moving = np.abs(speed) > 1e-6
+    loss = friction.coulomb_nm + friction.load_coefficient * np.abs(torque / ratio)
+    # At rest the motor takes part of its torque back: anything within the friction holds.
+    held = np.where(moving, np.sign(speed), -0.3 * up)
+    rng = np.random.default_rng(3)
+    return Record("crept", time, {
+        "motor_angle": angle + 2e-5 * rng.standard_normal(len(time)),
+        "motor_torque": torque / ratio + held * loss + 1e-3 * rng.standard_normal(len(time)),
+        "output_torque": torque + 0.01 * rng.standard_normal(len(time)),
+    })  # fmt: skip
+
+
+def test_a_drive_that_creeps_and_rests_keeps_its_friction():
+    """So slow that the smooth sign is hardly friction: its fit bends friction, and looks no worse for it."""
+    base = Scenario.model_validate(TWISTED)
+    bench = bench_for([crept(base)], [], base, None)
+    found = {one.name: one for one in refit(bench, state_of(base)).intervals}
+    assert bench.predictors[0].smoothing < 0.05
+    value = found["drive.friction.coulomb_nm"].value
+    assert value == pytest.approx(base.drive.friction.coulomb_nm, rel=0.05)

@@ -22,6 +22,7 @@ from telling import (
 
 from hdsim.diagnosis.evidence import HeldOutEvidence
 from hdsim.diagnosis.further import CurveFound
+from hdsim.diagnosis.remains import remains
 from hdsim.diagnosis.verdict import Remainder, TeethFound
 from hdsim.estimate.found import ParameterEstimate
 from hdsim.tell.wording import farthest, headline, meaning, much_left, sureness
@@ -76,19 +77,6 @@ def test_nothing_is_very_sure_while_much_is_left(evidence, left):
     assert "very" not in sure.sentence.lower()
 
 
-def test_what_only_an_effect_without_a_name_explains_is_left_too():
-    unsure = law("unbalance", gain=0.15, sampled=0.4, needed=0.1, own_left=0.9)
-    found = told(EFFECT.model_copy(update={"laws": [*EFFECT.laws, unsure], "explained": 0.99}))
-    assert [effect.name for effect in found.verdict.effects] == ["motor_torque_ripple"]
-    gap = GAP.model_copy(update={"refit": 5.0 * GAP.noise, "after": 2.5 * GAP.noise})
-    found = type(found)(found.verdict.model_copy(update={"gap": {"motor_torque": gap}}), found.evidence)
-    assert (
-        much_left(found)
-        == "2.5 times the noise of the motor torque and 22\u00a0% of the systematic residual remain"
-    )
-    assert sureness(found).words != "Very sure"
-
-
 def test_what_is_left_is_on_the_page(tmp_path):
     assert "<p class='left'>But 16\u00a0% of the systematic residual remains.</p>" in page(
         confident(0.995, explained=0.84), tmp_path
@@ -127,11 +115,13 @@ def test_each_of_several_names_has_its_own_probability():
 
 def test_what_a_name_leaves_is_said_with_its_place():
     stages = [stage(0.9, 0.0025), stage(0.4, 0.0025)]
-    found = told(EFFECT.model_copy(update={"explained": 0.91, "left_chance": 0.0025, "stages": stages}))
+    evidence = EFFECT.model_copy(update={"explained": 0.91, "left_chance": 0.0025, "stages": stages})
+    found = told(evidence, remains=remains(evidence))
     assert headline(found).endswith(
         "9\u00a0% of the systematic residual remains, a function of the output angle."
     )
-    assert "residual remains" not in headline(told(EFFECT.model_copy(update={"explained": 0.91})))  # chance
+    assert remains(EFFECT.model_copy(update={"explained": 0.91, "left_chance": 0.5})) is None  # chance
+    assert remains(evidence.model_copy(update={"explained": 0.99})) is None  # too little to say
 
 
 def test_a_curve_beside_a_name_is_what_the_name_leaves(tmp_path):
