@@ -14,6 +14,7 @@ from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.traces import screen, traces
 from hdsim.diagnosis.verdict import IdentifiedEffect
 from hdsim.effects import catalogue
+from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, added_spreads, at_present, fit
 from hdsim.estimate.numbers import base_freedoms
@@ -24,8 +25,16 @@ from hdsim.estimate.write import fitted_numbers
 from hdsim.scenario import Scenario
 
 
-def scenario(effects: dict[str, Any], model: str = "tabulated") -> Scenario:
-    mesh = {"model": model} | ({"ring": "static"} if model in ("teeth", "tabulated") else {})
+def scenario(
+    effects: dict[str, Any],
+    model: str = "tabulated",
+    *,
+    amplitude_deg: float = 2600,
+    engagement: dict[str, float] | None = None,
+) -> Scenario:
+    mesh: dict[str, Any] = {"model": model}
+    if model in ("teeth", "tabulated"):
+        mesh |= {"ring": "static", "engagement": {"kind": "window", **(engagement or {})}}
     return Scenario.model_validate(
         {
             "drive": {"preset": "seed-2021", "mesh": mesh, "torsion": {"damping_nm_s_per_rad": 40.0}},
@@ -33,7 +42,7 @@ def scenario(effects: dict[str, Any], model: str = "tabulated") -> Scenario:
             "command": {
                 "motor": {
                     "type": "motion",
-                    "trajectory": {"type": "sine", "amplitude_deg": 2600, "frequency_hz": 0.4},
+                    "trajectory": {"type": "sine", "amplitude_deg": amplitude_deg, "frequency_hz": 0.4},
                 }
             },
             "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 8.0, "centre_of_mass_m": 0.4}},
@@ -42,9 +51,9 @@ def scenario(effects: dict[str, Any], model: str = "tabulated") -> Scenario:
     )
 
 
-def bench_of(effects: dict[str, Any]) -> tuple[Bench, Fit]:
+def bench_of(effects: dict[str, Any], **drive: Any) -> tuple[Bench, Fit]:
     """A record of a drive with all its teeth, and the base's fit without its own numbers moved."""
-    run, rng = hdsim.simulate(scenario(effects, "teeth")), np.random.default_rng(1)
+    run, rng = hdsim.simulate(scenario(effects, "teeth", **drive)), np.random.default_rng(1)
     late = run.time >= 0.6 - 1e-9
     time = run.time[late] - 0.6
     noise = {"motor_angle": 2e-6, "output_angle": 1e-6, "motor_torque": 3e-3}
@@ -105,6 +114,28 @@ def test_the_tooth_that_is_out_of_place_is_found_on_its_spline(
     low, high = said.tooth.interval
     assert low < said.tooth.value < high < low + 6
     assert numbers["shift_um"].value == pytest.approx(shift_um, rel=0.15)
+
+
+def test_every_way_of_fitting_has_its_own_trace_where_a_screening_is_used_again() -> None:
+    bench, base = bench_of({"output_backlash": {"backlash_arcmin": 0.3}})
+    left = left_of(bench, base)
+    first = screen(bench, base.state, left, [])
+    again = screen(bench, base.state, left, [], before=first)
+    widths = [key for key in first.seen if key[0] == "output_backlash"]
+    assert len(widths) == len(starts_of("output_backlash", bench, base)) > 1
+    assert set(first.seen) == set(again.seen)
+    for key, (added, columns) in first.seen.items():
+        earlier, same = again.seen[key]
+        assert earlier == added
+        np.testing.assert_array_equal(same, columns)
+    assert [one.name for one in again.ranked] == [one.name for one in first.ranked]
+
+
+def starts_of(name: str, bench: Bench, base: Fit) -> list[Added]:
+    fittings: tuple[Fitting, ...] = catalogue()[name].fittings  # type: ignore[attr-defined]
+    ranges = bench.ranges(base.state)
+    ways = [way for way in fittings if way.mesh in ("", "toothed")]
+    return [added for way in ways for added in starts(name, way, (), ranges)]
 
 
 def test_what_only_teeth_have_is_asked_of_teeth_alone() -> None:
