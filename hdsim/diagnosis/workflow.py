@@ -30,6 +30,7 @@ from hdsim.diagnosis.sentences import (
 from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.errors import InputError
+from hdsim.estimate.asked import asked_for, gone_with
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
@@ -177,6 +178,8 @@ def _diagnosed(
 
     with running:
         found = search(bench, base.fit, during)
+    # Its own numbers are those that effects have asked for, too.
+    base = replace(base, freedoms=[*base.freedoms, *asked_for(start, found.fit.state.added)])
     states = {"before": start, "refit": base.fit.state, "after": found.fit.state}
     with step("prove", "validating on held-out data"):
         gap, predictions = gaps(bench, states)
@@ -265,5 +268,8 @@ def _only(bench: Bench, base: Refit, found: Search, believed: Sequence[int]) -> 
     """The model with the believed effects only, fitted anew."""
     if not believed:
         return base.fit
-    added = tuple(found.fit.state.added[k] for k in believed)
-    return together(bench, found.fit, replace(found.fit.state, added=added))
+    current = found.fit
+    for k in reversed(range(len(current.state.added))):
+        if k not in believed:
+            current = gone_with(current, k)
+    return together(bench, current)
