@@ -251,7 +251,8 @@ def _diagnosed(
         # With more added than is believed, the last residual is not that of the believed.
         rest = rest_words(evidence) if len(named) == len(found.named) else ""
         sentence = f"The model is missing {words}.{rest}"
-        teeth = teeth_found(effects, current.state, (bench, current))
+        with step("prove", "asking what the names say of the teeth"):
+            teeth = teeth_found(effects, current.state, (bench, current))
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
         verdict = numbers_off(off, common, sure=bool(moved))
