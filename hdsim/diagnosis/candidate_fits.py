@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdsim.diagnosis.traces import designs
+from hdsim.estimate.asked import asked_beside
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit, at_present, fit, sharpened
-from hdsim.estimate.numbers import scaled
+from hdsim.estimate.numbers import Free, scaled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import REACHED
@@ -98,7 +99,7 @@ def rough_fits(
         columns: its trace at the point, shape (rows, k).
         power: what one independent sample of the linear fit's residual counts.
     """
-    frees = at_present(base)
+    frees, asked = at_present(base), asked_beside(base, added)
     f, before_it = len(frees), Vector(base.state, (), 0)
     x0 = before_it.start()
     moves, coefficients = linear_fit(base, point, added, columns, power)
@@ -128,9 +129,13 @@ def rough_fits(
         state = replace(base.state, added=(*earlier, replace(added, coefficients=tuple(start))))
         theta = {free.name: float(t) for free, t in zip(frees, point.theta + move[:f], strict=True)}
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            # What it asks for does nothing without it.
+            own = _slopes(bench, state, frees, theta, asked)
+            known = np.hstack([point.columns[:, :f], own, point.columns[:, f:], columns])
+            evaluations = ROUGH + 2 * len(asked)
             found.append(
-                fit(bench, state, frees, prune=False, evaluations=ROUGH, theta=theta, after=base,
-                    known=(np.hstack([point.columns, columns]), power), rough=True)
+                fit(bench, state, [*frees, *asked], prune=False, evaluations=evaluations, theta=theta,
+                    after=base, known=(known, power), rough=True)
             )  # fmt: skip
 
     for start, move in begins:
@@ -140,6 +145,17 @@ def rough_fits(
         # A step so long that it leads astray: where numbers almost stand in for one another.
         begin(SMALL * coefficients, SMALL * moves)
     return found
+
+
+def _slopes(
+    bench: Bench, state: State, frees: Sequence[Free], theta: dict[str, float], asked: Sequence[Free]
+) -> Array:
+    """Sensitivities to what an effect asks for, where its fit begins, shape (rows, asked)."""
+    if not asked:
+        return np.zeros((len(bench.stacked_blocks()), 0))
+    there = scaled(state, frees, [theta[free.name] for free in frees])
+    vector = Vector(there, tuple(asked), len(there.added))
+    return sensitivities(bench, vector, vector.start())
 
 
 def linear_fit(base: Fit, point: Point, added: Added, columns: Array, power: float) -> tuple[Array, Array]:
@@ -174,7 +190,8 @@ def full_fits(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
         found = sharpened(bench, found)
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     state = replace(base.state, added=found.state.added)
-    evaluations = FULL + 4 * bool(found.state.added[-1].shapes)
+    added = found.state.added[-1]
+    evaluations = FULL + 4 * bool(added.shapes) + 2 * len(added.fitting.asks)
     known = found.columns, power_of_sample(bench, bench.stacked(bench.residuals(found.predictions)))
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         full = fit(bench, state, found.frees, prune=False, evaluations=evaluations, theta=theta, after=base,
@@ -205,7 +222,7 @@ def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> l
     several: list[Fit] = []
     if others:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            there = point_at(bench, base, found.theta)
+            there = point_at(bench, base, found.theta[: len(base.frees)])
             for other in others:
                 several += fits_from(bench, base, there, other)
     return [end for each in several for end in _to_its_end(bench, base, each, enough)]

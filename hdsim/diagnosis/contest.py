@@ -140,7 +140,7 @@ def _after_the_best(
     if not rivals:
         return
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-        there = point_at(bench, base, leader.theta)
+        there = point_at(bench, base, leader.theta[: len(base.frees)])
         for one in rivals:
             tell(f"fitting {one.name} from where {name} led")
             for shapes in product(*(shape.starts for shape in one.added.fitting.shapes)):

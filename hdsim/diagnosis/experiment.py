@@ -238,7 +238,11 @@ def _steps(fit: Fit) -> list[tuple[State, float]]:
 
 
 def _simulated(
-    experiment: Experiment, state: State, channels: Sequence[str], rate: float, table_for: str | None
+    experiment: Experiment,
+    state: State,
+    channels: Sequence[str],
+    rate: float,
+    table_for: frozenset[str] | None,
 ) -> dict[str, Array] | None:
     """The channels that an experiment measures under a model, without its start; None when it fails."""
     from hdsim.actuation.command import Command

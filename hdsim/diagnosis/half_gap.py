@@ -122,7 +122,7 @@ def _imputed(told: Array, within: float) -> tuple[float, float]:
 def _told(bench: Bench, whole: Fit, k: int) -> Array:
     """Mean half-gaps, m, by a fit and by those of drives with other teeth that explain the data as well."""
     fits = [whole]
-    for other in drawn_anew(whole.state, engaged=True):
+    for other in drawn_anew(whole.state, engaged=True, fitted=whole.frees):
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             fits.append(
                 fit(bench, other, at_present(whole), prune=False, evaluations=EVALUATIONS, after=whole,

@@ -12,6 +12,7 @@ from hdsim.diagnosis.revise import revised
 from hdsim.diagnosis.rules import RULES
 from hdsim.diagnosis.search import Search
 from hdsim.diagnosis.verdict import Remains
+from hdsim.estimate.asked import gone_with
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.refit import together
 
@@ -32,8 +33,7 @@ def taken_back(bench: Bench, found: Search, k: int, tell: Callable[[str], object
         tell: told what is being done.
     """
     named = [replace(one) for j, one in enumerate(found.named) if j != k]
-    added = tuple(one for j, one in enumerate(found.fit.state.added) if j != k)
-    fit = together(bench, found.fit, replace(found.fit.state, added=added))
+    fit = together(bench, gone_with(found.fit, k))
     fit = revised(bench, fit, named, tell)
     left = left_of(bench, fit)
     location = locate(bench, left, bench.residuals(fit.predictions, drift=True), fit.state.delays)

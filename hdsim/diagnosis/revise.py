@@ -10,15 +10,15 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from hdsim.diagnosis.name import MISMATCH, Named, confusable
+from hdsim.estimate.asked import gone_with
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
-from hdsim.estimate.fit import Fit, at_present, fit, settled
+from hdsim.estimate.fit import Fit, fit, settled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import together
 
@@ -120,12 +120,10 @@ def without(bench: Bench, current: Fit, k: int) -> Fit | None:
         current: the model with it.
         k: which of its effects.
     """
-    added = current.state.added
-    columns = np.delete(current.columns, current.numbers_of(k), axis=1)
-    state = replace(current.state, added=(*added[:k], *added[k + 1 :]))
-    known = columns, math.nan
+    gone = gone_with(current, k)
+    known = gone.columns, math.nan
     try:
-        return fit(bench, state, at_present(current), prune=False, after=current, known=known, rough=True)
+        return fit(bench, gone.state, gone.frees, prune=False, after=gone, known=known, rough=True)
     except (PredictionError, np.linalg.LinAlgError):
         return None
 

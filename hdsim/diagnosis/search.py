@@ -27,6 +27,7 @@ from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
 from hdsim.estimate.orders import Line, power_of
 from hdsim.estimate.refit import align, reweigh, together, with_delays
+from hdsim.estimate.short_cut import follow_teeth
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
 MOST_EFFECTS, MOST_STAGES = 4, 7
@@ -71,6 +72,7 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         following = _next(bench, base, found, during)
         if following is not None:
             found.fit = following
+            follow_teeth(bench, base.state, following.state)
             continue
         late = with_delays(bench, found.fit, rough=True)
         if late is None:

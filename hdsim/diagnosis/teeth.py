@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hdsim.diagnosis.half_gap import half_gap_ends, half_gap_with, own_half_gap
+from hdsim.diagnosis.other_spline import of_other_spline
 from hdsim.diagnosis.verdict import IdentifiedEffect, TeethFound
 from hdsim.drive.parameters import LumpedMesh, ToothedMesh
 from hdsim.drive.play_as_teeth import PlayAsTeeth, half_gap_of_play, play_as_teeth
@@ -39,7 +40,7 @@ def teeth_found(
         if of is None or of.field not in effect.parameters:
             continue
         if of.says == "place":
-            _place(found, effect, of, state)
+            _place(found, effect, of, state, data)
         elif isinstance(state.drive.mesh, ToothedMesh):
             _gap(found, effect, of, state, data)
         elif isinstance(state.drive.mesh, LumpedMesh) and of.play_arcmin > 0.0:
@@ -47,23 +48,48 @@ def teeth_found(
     return found if found.sentences else None
 
 
-def _place(found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State) -> None:
+def _place(
+    found: TeethFound, effect: IdentifiedEffect, of: OfTeeth, state: State, data: tuple[Bench, Fit] | None
+) -> None:
     """The number of a tooth on its spline, from 0; its opposite one acts at the same time."""
-    number, member = effect.parameters[of.field], str(effect.settings.get("member", "flexspline"))
+    member = str(effect.settings.get("member", "flexspline"))
+    number, count = _within_half_a_turn(effect.parameters[of.field], member, state)
+    found.member, found.tooth = member, number
+    found.opposite = (number.value + 0.5 * count) % count
+    found.sentences.append(
+        f"It is tooth {number.value:.0f}{_ends_of(number)} of the {member.replace('_', ' ')}, counted from "
+        "the one on the wave generator's lobe at zero angles, or the opposite one, tooth "
+        f"{found.opposite:.0f}: both lobes press alike."
+    )
+    names = [added.effect for added in state.added]
+    if data is None or effect.name not in names:
+        return
+    bench, whole = data
+    other = of_other_spline(bench, whole, names.index(effect.name), of.field)
+    if other is None:
+        return
+    found.or_member = other[0]
+    found.or_tooth, _ = _within_half_a_turn(other[1], other[0], state)
+    found.sentences.append(
+        f"Or it is tooth {found.or_tooth.value:.0f}{_ends_of(found.or_tooth)} of the "
+        f"{other[0].replace('_', ' ')}, which explains the data as well: in {bench.turns:.2g} turns of the "
+        "wave generator the teeth of the two splines hardly move past each other."
+    )
+
+
+def _within_half_a_turn(
+    number: ParameterEstimate, member: str, state: State
+) -> tuple[ParameterEstimate, int]:
+    """A tooth's number below that of its opposite one, and how many teeth its spline has."""
     geometry = state.drive.geometry
     count = geometry.circular_spline_teeth if member == "circular_spline" else geometry.flexspline_teeth
     turns = math.floor(number.value / (0.5 * count)) * 0.5 * count
-    value = number.value - turns
-    low, high = number.interval or (math.nan, math.nan)
-    interval = None if math.isnan(low) else (low - turns, high - turns)
-    found.member, found.tooth = member, ParameterEstimate(value=value, interval=interval)
-    found.opposite = (value + 0.5 * count) % count
-    ends = "" if interval is None else f" ({interval[0]:.0f} to {interval[1]:.0f})"
-    found.sentences.append(
-        f"It is tooth {value:.0f}{ends} of the {member.replace('_', ' ')}, counted from the one on the wave "
-        f"generator's lobe at zero angles, or the opposite one, tooth {found.opposite:.0f}: both lobes press "
-        "alike."
-    )
+    interval = None if number.interval is None else (number.interval[0] - turns, number.interval[1] - turns)
+    return ParameterEstimate(value=number.value - turns, interval=interval), count
+
+
+def _ends_of(number: ParameterEstimate) -> str:
+    return "" if number.interval is None else f" ({number.interval[0]:.0f} to {number.interval[1]:.0f})"
 
 
 def _gap(

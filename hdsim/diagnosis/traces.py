@@ -54,7 +54,8 @@ class Screening:
         ranked: by falling share, one entry an effect.
         chance: probability that the search finds the best share where nothing is missing.
         skipped: effects that could not be tried, with the reason.
-        seen: traces that were simulated, whitened with ``sigmas``, by effect, way of fitting and shapes.
+        seen: traces that were simulated, whitened with ``sigmas``, by what was asked for (``_key``): effect,
+            way of fitting with its units and settings, shapes. The units that were used may be others.
         sigmas: of every series when they were.
         behind: whether a way of fitting an effect acts behind the sensor whose reading is the load.
     """
@@ -138,22 +139,22 @@ def screen(
         without = bench.predict(state)
 
     def look(several: Sequence[Added], *, first: bool = True) -> None:
-        known = _known(before, several, found.sigmas, bench) if first else []
-        keys = {_key(added) for added, _ in known}
+        known = _known(before, several, found.sigmas, bench) if first else {}
+        new = [added for added in several if _key(added) not in known]
         with bench.coarse():
-            new = [added for added in several if _key(added) not in keys]
-            found_traces = known + traces(bench, state, without, new, wanted)
-        for added, columns in found_traces:
+            simulated = traces(bench, state, without, new, wanted)
+        keys = [*known, *(_key(added) for added in new)]
+        for key, (added, columns) in zip(keys, [*known.values(), *simulated], strict=True):
             if columns is None or not np.any(columns):
                 continue
             if first and not added.orders:
-                found.seen[_key(added)] = added, columns
+                found.seen[key] = added, columns
             share = _allowed(residual, columns, added.fitting.signed(added.orders))
             shares.append(share)
-            key = added.effect, added.fitting.label
-            if key not in kinds or share.share > kinds[key].share.share:
+            way = added.effect, added.fitting.label
+            if way not in kinds or share.share > kinds[way].share.share:
                 added = replace(added, coefficients=tuple(share.coefficients))
-                kinds[key] = Screened(added.effect, added, share, columns)
+                kinds[way] = Screened(added.effect, added, share, columns)
 
     look(tried)
     # A residual may live in a coordinate that only an effect's trace shows, as it rings on its way.
@@ -196,22 +197,20 @@ def _remarkable_first(found: Screening, shares: Sequence[Share]) -> None:
 
 
 def _key(added: Added) -> tuple[str, str, tuple[float, ...]]:
-    return added.effect, added.fitting.label, added.shapes
+    """All that an effect's trace depends on, as it is asked for: two ways of fitting may share a label."""
+    return added.effect, repr(added.fitting), added.shapes
 
 
 def _known(
     before: Screening | None, wanted: Sequence[Added], sigmas: Array, bench: Bench
-) -> list[tuple[Added, Array | None]]:
+) -> dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array | None]]:
     """Traces of an earlier screening in these weights; without those whose orders are read from the data."""
     if before is None:
-        return []
+        return {}
     factor = (before.sigmas / sigmas)[bench.stacked_series()][:, None]
-    found: list[tuple[Added, Array | None]] = []
-    for added in wanted:
-        if not added.orders and _key(added) in before.seen:
-            earlier, columns = before.seen[_key(added)]
-            found.append((earlier, columns * factor))
-    return found
+    keys = [_key(added) for added in wanted if not added.orders]
+    seen = {key: before.seen[key] for key in keys if key in before.seen}
+    return {key: (earlier, columns * factor) for key, (earlier, columns) in seen.items()}
 
 
 def ranked_anew(screening: Screening, residual: Residual) -> Screening:

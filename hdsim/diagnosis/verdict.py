@@ -88,6 +88,10 @@ class TeethFound(Part):
     """Its number, from the tooth on the wave generator's lobe at zero angles."""
     opposite: float | None = None
     """The tooth half a turn on, which these data cannot tell from it."""
+    or_member: str = ""
+    """The other spline, where a tooth of it explains the data as well; else empty."""
+    or_tooth: ParameterEstimate | None = None
+    """The number of that tooth."""
     half_gap_um: ParameterEstimate | None = None
     """Mean half-gap of the teeth."""
     roughness_m: dict[str, float] = {}

@@ -32,6 +32,7 @@ from hdsim.diagnosis.sentences import (
 from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.errors import InputError
+from hdsim.estimate.asked import asked_for
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
@@ -177,6 +178,8 @@ def _diagnosed(
 
     with running:
         found = search(bench, base.fit, during)
+    # Its own numbers are those that effects have asked for, too.
+    base = replace(base, freedoms=[*base.freedoms, *asked_for(start, found.fit.state.added)])
     with step("prove", "validating on held-out data"):
         judged = _judged(bench, base, found, start)
     whole = found, judged
@@ -262,7 +265,8 @@ def _diagnosed(
         effects = named_effects(named, decision, current)
         words = " and ".join(effect_words(effect) for effect in effects)
         sentence = f"The model is missing {words}.{rest_words(rest)}"
-        teeth = teeth_found(effects, current.state, (bench, current))
+        with step("prove", "asking what the names say of the teeth"):
+            teeth = teeth_found(effects, current.state, (bench, current))
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
         verdict = numbers_off(off, common, sure=bool(moved))

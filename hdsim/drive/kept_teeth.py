@@ -24,7 +24,7 @@ def teeth_of(
     extra_half_gap_rad: float,
     seed: int,
     gap_growth: float = 0.0,
-    table_for: str | None = None,
+    table_for: frozenset[str] | None = None,
 ) -> Teeth:
     """``Teeth``, kept for the next model: a fit makes hundreds that differ in numbers that no tooth sees.
 
@@ -37,13 +37,13 @@ def teeth_of(
         extra_half_gap_rad: likewise.
         seed: likewise.
         gap_growth: likewise.
-        table_for: fingerprint of the teeth that are taken from a table; others are summed, for a table of
+        table_for: fingerprints of teeth that are taken from a table; others are summed, for a table of
             them would serve once. As the mesh says when None.
     """
     given: Any = {"extra_half_gap_rad": extra_half_gap_rad, "seed": seed, "gap_growth": gap_growth}
     if table_for is not None:
         summed = teeth_of(drive, _as(TeethMesh, mesh), wind_ups, **given)
-        if summed.fingerprint != table_for:
+        if summed.fingerprint not in table_for:
             return summed
         return teeth_of(drive, _as(TabulatedMesh, mesh), wind_ups, **given)
     if isinstance(mesh.contact, TableLawParameters):

@@ -42,8 +42,8 @@ class Model(Contributed):
         seed: seed of the random tooth surfaces and of all noise.
         audited: the energies supplied, delivered and dissipated are states, and every part's heat has its
             account: what the energy audit needs.
-        table_for: of a toothed mesh, ``Teeth.fingerprint`` of the teeth whose table serves for their sum; as
-            the drive's mesh says when None.
+        table_for: of a toothed mesh, ``Teeth.fingerprint`` of all whose table serves for their sum; as the
+            drive's mesh says when None.
 
     Attributes:
         system: the ODE, a ``hdsim.system.System``.
@@ -63,7 +63,7 @@ class Model(Contributed):
         signals: Mapping[str, Any] | None = None,
         seed: int = 0,
         audited: bool = True,
-        table_for: str | None = None,
+        table_for: frozenset[str] | None = None,
     ) -> None:
         super().__init__()
         self._table_for = table_for

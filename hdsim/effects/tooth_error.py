@@ -58,6 +58,8 @@ class ToothError(Effect):
             label=f"of the {member.replace('_', ' ')}, {meets}",
             turns=1.0,
             mesh="toothed",
+            # It is felt for as long as its arc is, and as suddenly as that begins.
+            asks=("drive.mesh.engagement.share", "drive.mesh.engagement.edge_teeth"),
         )
         for member in ("flexspline", "circular_spline")
         for meets, shift_um in (("early", 10.0), ("late", -10.0))

@@ -8,7 +8,7 @@ the load stands in no catalogue.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ import numpy as np
 from hdsim.drive.parameters import ToothedMesh
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
-from hdsim.estimate.numbers import scaled, undeclared
+from hdsim.estimate.numbers import Free, scaled, undeclared
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
@@ -32,12 +32,13 @@ if TYPE_CHECKING:
 DRAWS, SPARE = 8, 1.5
 
 
-def drawn_anew(state: State, *, engaged: bool = False) -> list[State]:
+def drawn_anew(state: State, *, engaged: bool = False, fitted: Sequence[Free] = ()) -> list[State]:
     """The model with other flanks; none where nothing of its teeth is drawn.
 
     Args:
         state: the model.
         engaged: draw the engagement's numbers from their priors, too.
+        fitted: numbers that a fit of the model moves: those of the engagement are known by it, not drawn.
     """
     mesh = state.drive.mesh
     if not isinstance(mesh, ToothedMesh):
@@ -48,13 +49,15 @@ def drawn_anew(state: State, *, engaged: bool = False) -> list[State]:
     drive = state.drive.model_copy(update={"mesh": mesh.model_copy(update={"flanks": flanks})})
     rng = np.random.default_rng([state.seed, 31])
     others = [replace(state, drive=drive, seed=int(seed)) for seed in rng.integers(2**31, size=DRAWS)]
-    return [_engaged(other, rng) for other in others] if engaged else others
+    known = {free.name for free in fitted}
+    return [_engaged(other, rng, known) for other in others] if engaged else others
 
 
-def _engaged(state: State, rng: np.random.Generator) -> State:
-    """The model with its engagement's numbers drawn from their priors, within what their fields allow."""
+def _engaged(state: State, rng: np.random.Generator, known: Collection[str]) -> State:
+    """The model with its engagement's unknown numbers drawn from their priors, within what fields allow."""
     section = "drive.mesh.engagement"
     paths = [f"{section}.{name}" for name in type(state.drive.mesh.engagement).model_fields]
+    paths = [path for path in paths if path not in known]
     frees = [free for path in paths if (free := undeclared(state, path, 0.0)) and free.prior > 0]
     thetas = [float(np.clip(free.prior * rng.standard_normal(), *free.bounds)) for free in frees]
     return scaled(state, frees, thetas)
@@ -192,7 +195,7 @@ def widen_by_flanks(bench: Bench, found: Fit) -> None:
 
     They move a number by as much in all blocks of time, so what is left does not show it.
     """
-    others = drawn_anew(found.state, engaged=True)
+    others = drawn_anew(found.state, engaged=True, fitted=found.frees)
     if not others or not found.columns.size:
         return
     moves = other_drives(bench, found, others)

@@ -120,7 +120,7 @@ class Predictor:
         self.runs = 0
         #: Of drives with teeth (``hdsim.estimate.short_cut``): no short cut; whose teeth are in a table.
         self.whole = False
-        self.table_for: str | None = None
+        self.table_for: frozenset[str] | None = None
 
     def turn(self, angle: float) -> None:
         """Turn the prescribed motion: only where a side is locked does its zero mean anything.

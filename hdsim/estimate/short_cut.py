@@ -4,7 +4,8 @@ A toothed ring is a light body between two stiff springs: its modes lie at tens 
 sensor of a drive hears anything. A prediction therefore
 
 * resolves the ring's twist, and its speed only by what it does to that twist (``Model.seen_scale``);
-* takes the base's own teeth from a table that is made once; teeth that a fit has moved are summed;
+* takes the base's own teeth, and those of the model that a search has come to, from tables that are made
+  once; teeth that a fit is moving are summed;
 * of a ring that next to nothing damps takes the static balance (``Drive.settled``).
 
 The first two are compared with the whole model, teeth summed and the ring's speed followed ten times more
@@ -47,7 +48,7 @@ def take_short_cut(bench: Bench, state: State) -> None:
         if table_for is None:
             return
         for predictor in bench.predictors:
-            predictor.table_for = table_for
+            predictor.table_for = frozenset({table_for})
         short = bench.predict(state)
         with whole_models(bench):
             whole = bench.predict(state)
@@ -58,6 +59,21 @@ def take_short_cut(bench: Bench, state: State) -> None:
         bench.refused = error
         for predictor in bench.predictors:
             predictor.whole = True
+
+
+def follow_teeth(bench: Bench, base: State, state: State) -> None:
+    """Let a fitted model's own teeth be taken from a table as well: a whole search follows from there.
+
+    Args:
+        bench: the measured series; its predictors are changed.
+        base: the re-fitted model.
+        state: the fitted model.
+    """
+    if bench.predictors[0].table_for is None or bench.refused:
+        return
+    known = {_fingerprint(each.candidate()) for each in (base, state)}
+    for predictor in bench.predictors:
+        predictor.table_for = frozenset(one for one in known if one is not None)
 
 
 def short_cut_of(bench: Bench, short: Sequence[Array], whole: Sequence[Array]) -> ShortCut | None:

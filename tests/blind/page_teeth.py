@@ -39,16 +39,20 @@ def held(line: Line) -> bool:
 def teeth_away(line: Line) -> float | None:
     """Teeth from the named one to the one that is out of place or its opposite, whichever is nearer.
 
+    Where the verdict says that a tooth of the other spline explains the data as well, that one counts too.
     Infinite on the wrong spline. ``None`` where no tooth is out of place, or none is named.
     """
     said = (line["verdict"] or {}).get("teeth") or {}
     if not _hidden(line, "tooth_error") or not said.get("tooth"):
         return None
     true, ratio = line["setup"]["changes"]["tooth_error"], line["setup"]["ratio"]
-    if said["member"] != true["member"]:
+    named = {said["member"]: said["tooth"]}
+    if said.get("or_tooth"):
+        named[said["or_member"]] = said["or_tooth"]
+    if true["member"] not in named:
         return math.inf
     count = round(2 * abs(ratio)) - (2 if ratio > 0 else 0) + 2 * (true["member"] == "circular_spline")
-    away = (said["tooth"]["value"] - true["tooth"]) % (0.5 * count)
+    away = (named[true["member"]]["value"] - true["tooth"]) % (0.5 * count)
     return float(min(away, 0.5 * count - away))
 
 
@@ -108,7 +112,13 @@ def _teeth(lines: Sequence[Line]) -> list[str]:
         if away is None:
             continue
         true, said = r["setup"]["changes"]["tooth_error"], r["verdict"]["teeth"]
-        spline, named = true["member"].replace("_", " "), said["member"].replace("_", " ")
-        rows.append([r["key"], band(r), f"{true['tooth']:.0f} of the {spline}",
-                     f"{said['tooth']['value']:.1f} of the {named}", f"{away:.1f}"])  # fmt: skip
+        named = _tooth_of(said["tooth"]["value"], said["member"], 1)
+        if said.get("or_tooth"):
+            named += f" or {_tooth_of(said['or_tooth']['value'], said['or_member'], 1)}"
+        out = _tooth_of(true["tooth"], true["member"], 0)
+        rows.append([r["key"], band(r), out, named, f"{away:.1f}"])
     return table(["key", "strength", "out of place", "named", "teeth off"], rows)
+
+
+def _tooth_of(number: float, member: str, digits: int) -> str:
+    return f"{number:.{digits}f} of the {member.replace('_', ' ')}"

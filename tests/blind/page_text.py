@@ -88,8 +88,9 @@ where nothing is hidden or a parameter is wrong. A diagnosis that stops with an 
 held-out residual is the part beyond the sensors' errors; in the `toothed` family
 beyond what the plant itself leaves when its motor is moved as the log tells: a load that rattles in its play
 rests where the last bounce left it, which no log has. In the `teeth` family a tooth is found where the named
-one is on the right spline and within two of the one out of place or of its opposite (both lobes press alike);
-the true half-gap is the mean of the plant's own flanks.
+one is on the right spline and within two of the one out of place or of its opposite (both lobes press alike),
+or the one of the other spline that the verdict calls as good is; the true half-gap is the mean of the plant's
+own flanks.
 
 A recording has effects of its own. Of its effects those count as new that are not identified without the
 injected one and that its source does not list. The stated confidence is that of the first new one or of the

@@ -55,6 +55,18 @@ def test_the_other_spline_is_wrong_and_no_tooth_is_none():
     assert teeth_away(gap(1.5, [1.0, 2.0])) is None
 
 
+def test_a_tooth_of_the_other_spline_that_is_told_as_well_counts():
+    one = tooth("flexspline", 10.0, "circular_spline", 11.0)
+    one["verdict"]["teeth"] |= {"or_member": "flexspline", "or_tooth": {"value": 10.5}}
+    assert teeth_away(one) == pytest.approx(0.5)
+    assert (
+        "10 of the flexspline | 11.0 of the circular spline or 10.5 of the flexspline | 0.5 |"
+        in "\n".join(teeth([one], []))
+    )
+    one["verdict"]["teeth"] |= {"or_member": "", "or_tooth": None}
+    assert teeth_away(one) == math.inf
+
+
 def test_a_half_gap_is_asked_where_the_gap_is_hidden_and_told():
     assert half_gap(gap(1.4, [1.2, 1.6])) == (1.5, 1.4, 1.2, 1.6)
     assert held(gap(1.4, [1.2, 1.6]))

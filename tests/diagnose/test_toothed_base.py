@@ -8,12 +8,16 @@ import pytest
 
 import hdsim
 from hdsim.diagnosis.again import left_of
+from hdsim.diagnosis.contest import contest
+from hdsim.diagnosis.other_spline import of_other_spline
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.starts import neighbours, starts
 from hdsim.diagnosis.teeth import teeth_found
-from hdsim.diagnosis.traces import screen, traces
+from hdsim.diagnosis.traces import Screened, designs, screen, traces
 from hdsim.diagnosis.verdict import IdentifiedEffect
 from hdsim.effects import catalogue
+from hdsim.effects._fitting import Fitting
+from hdsim.estimate.asked import gone_with
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, added_spreads, at_present, fit
 from hdsim.estimate.numbers import base_freedoms
@@ -24,8 +28,16 @@ from hdsim.estimate.write import fitted_numbers
 from hdsim.scenario import Scenario
 
 
-def scenario(effects: dict[str, Any], model: str = "tabulated") -> Scenario:
-    mesh = {"model": model} | ({"ring": "static"} if model in ("teeth", "tabulated") else {})
+def scenario(
+    effects: dict[str, Any],
+    model: str = "tabulated",
+    *,
+    amplitude_deg: float = 2600,
+    engagement: dict[str, float] | None = None,
+) -> Scenario:
+    mesh: dict[str, Any] = {"model": model}
+    if model in ("teeth", "tabulated"):
+        mesh |= {"ring": "static", "engagement": {"kind": "window", **(engagement or {})}}
     return Scenario.model_validate(
         {
             "drive": {"preset": "seed-2021", "mesh": mesh, "torsion": {"damping_nm_s_per_rad": 40.0}},
@@ -33,7 +45,7 @@ def scenario(effects: dict[str, Any], model: str = "tabulated") -> Scenario:
             "command": {
                 "motor": {
                     "type": "motion",
-                    "trajectory": {"type": "sine", "amplitude_deg": 2600, "frequency_hz": 0.4},
+                    "trajectory": {"type": "sine", "amplitude_deg": amplitude_deg, "frequency_hz": 0.4},
                 }
             },
             "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 8.0, "centre_of_mass_m": 0.4}},
@@ -42,9 +54,9 @@ def scenario(effects: dict[str, Any], model: str = "tabulated") -> Scenario:
     )
 
 
-def bench_of(effects: dict[str, Any]) -> tuple[Bench, Fit]:
+def bench_of(effects: dict[str, Any], **drive: Any) -> tuple[Bench, Fit]:
     """A record of a drive with all its teeth, and the base's fit without its own numbers moved."""
-    run, rng = hdsim.simulate(scenario(effects, "teeth")), np.random.default_rng(1)
+    run, rng = hdsim.simulate(scenario(effects, "teeth", **drive)), np.random.default_rng(1)
     late = run.time >= 0.6 - 1e-9
     time = run.time[late] - 0.6
     noise = {"motor_angle": 2e-6, "output_angle": 1e-6, "motor_torque": 3e-3}
@@ -106,6 +118,94 @@ def test_the_tooth_that_is_out_of_place_is_found_on_its_spline(
     low, high = said.tooth.interval
     assert low < said.tooth.value < high < low + 6
     assert numbers["shift_um"].value == pytest.approx(shift_um, rel=0.15)
+
+
+def on_screen(bench: Bench, base: Fit, member: str, tooth: float, shift_um: float) -> Screened:
+    """A tooth of the right sign and size, not quite in its place."""
+    meets = "early" if shift_um > 0 else "late"
+    label = f"of the {member.replace('_', ' ')}, {meets}"
+    fittings: tuple[Fitting, ...] = catalogue()["tooth_error"].fittings  # type: ignore[attr-defined]
+    (way,) = (each for each in fittings if each.label == label)
+    own = way.within(bench.ranges(base.state))
+    assert own is not None
+    added = Added("tooth_error", own, (0.7 * abs(shift_um) / 10.0,), (tooth,))
+    with bench.coarse():
+        (columns,) = designs(bench, base.state, base.predictions, [replace(added, coefficients=(1.0,))])
+    assert columns is not None
+    share = left_of(bench, base).share(columns)
+    return Screened("tooth_error", replace(added, coefficients=tuple(share.coefficients)), share, columns)
+
+
+def found_with(bench: Bench, base: Fit, one: Screened) -> Fit:
+    with bench.coarse():
+        ((_, found, _),) = contest(bench, base, [one], left_of(bench, base), None)
+    return found
+
+
+NARROWER = {"share": 0.25, "edge_teeth": 11.0}
+
+
+@pytest.mark.slow
+def test_a_tooth_is_found_in_a_drive_whose_arc_of_teeth_is_another() -> None:
+    member, tooth, shift_um = "circular_spline", 49.0, -25.0
+    hidden = {"tooth_error": {"member": member, "tooth": tooth, "shift_um": shift_um}}
+    bench, base = bench_of(hidden, engagement=NARROWER)
+    found = found_with(bench, base, on_screen(bench, base, member, tooth + 2.0, shift_um))
+    settings = found.state.added[0].settings()
+    assert settings["tooth"] == pytest.approx(tooth, abs=0.7)
+    assert settings["shift_um"] == pytest.approx(shift_um, rel=0.1), (
+        "held to the model's arc it is a third off"
+    )
+    arc = found.state.drive.mesh.engagement
+    assert arc.share == pytest.approx(NARROWER["share"], rel=0.03)
+    noise = sum(bench.noise_powers.values())
+    assert bench.power(found.predictions) < 1.5 * noise, (
+        "with the model's arc twice the noise or more is left"
+    )
+    # Nothing else in the record tells of the arc: with the tooth it goes back to what was given.
+    gone = gone_with(found, 0)
+    assert gone.state.added == ()
+    assert gone.state.drive.mesh.engagement.share == pytest.approx(0.3)
+    assert gone.state.drive.mesh.engagement.edge_teeth == pytest.approx(8.0)
+    assert [free.name for free in gone.frees] == [free.name for free in base.frees]
+    assert gone.columns.shape[1] == len(base.frees)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("amplitude_deg", "told"), [(120.0, True), (2600.0, False)])
+def test_a_record_of_few_turns_does_not_tell_the_splines_apart(amplitude_deg: float, told: bool) -> None:
+    hidden = {"tooth_error": {"member": "flexspline", "tooth": 57.0, "shift_um": 12.0}}
+    bench, base = bench_of(hidden, amplitude_deg=amplitude_deg)
+    found = found_with(bench, base, on_screen(bench, base, "flexspline", 57.0, 12.0))
+    other = of_other_spline(bench, found, 0, "tooth")
+    assert (other is not None) == told
+    if other is not None:
+        member, number = other
+        assert member == "circular_spline"
+        assert number.value % 101.0 == pytest.approx(57.0 * 1.01, abs=3.0)
+
+
+@pytest.mark.slow
+def test_every_way_of_fitting_has_its_own_trace_where_a_screening_is_used_again() -> None:
+    bench, base = bench_of({"output_backlash": {"backlash_arcmin": 0.3}})
+    left = left_of(bench, base)
+    first = screen(bench, base.state, left, [])
+    again = screen(bench, base.state, left, [], before=first)
+    widths = [key for key in first.seen if key[0] == "output_backlash"]
+    assert len(widths) == len(starts_of("output_backlash", bench, base)) > 1
+    assert set(first.seen) == set(again.seen)
+    for key, (added, columns) in first.seen.items():
+        earlier, same = again.seen[key]
+        assert earlier == added
+        np.testing.assert_array_equal(same, columns)
+    assert [one.name for one in again.ranked] == [one.name for one in first.ranked]
+
+
+def starts_of(name: str, bench: Bench, base: Fit) -> list[Added]:
+    fittings: tuple[Fitting, ...] = catalogue()[name].fittings  # type: ignore[attr-defined]
+    ranges = bench.ranges(base.state)
+    ways = [way for way in fittings if way.mesh in ("", "toothed")]
+    return [added for way in ways for added in starts(name, way, (), ranges)]
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from hdsim.drive.parameters import TabulatedMesh, TeethMesh
 from hdsim.estimate import short_cut
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
-from hdsim.estimate.short_cut import LIMIT, short_cut_of, whole_models
+from hdsim.estimate.short_cut import LIMIT, follow_teeth, short_cut_of, whole_models
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 from hdsim.simulation.rosenbrock import rodas4_through
@@ -137,13 +137,34 @@ def test_a_table_is_made_once_and_is_the_same_to_the_last_bit():
     ],
 )
 def test_teeth_that_were_moved_are_summed(change):
-    known = model_of(scenario("teeth")).teeth.fingerprint
+    known = frozenset({model_of(scenario("teeth")).teeth.fingerprint})
     assert isinstance(model_of(scenario("teeth"), table_for=known).teeth.mesh, TabulatedMesh)
     for mesh in ("teeth", "tabulated"):
         assert isinstance(model_of(scenario(mesh, **change), table_for=known).teeth.mesh, TeethMesh)
     # An effect that widens the gap moves them too.
     worn = scenario("teeth", effects=("mesh_preload",))
     assert isinstance(model_of(worn, table_for=known).teeth.mesh, TeethMesh)
+
+
+def test_a_search_takes_the_teeth_that_it_has_come_to_from_a_table_too():
+    bench, base = opened(scenario("teeth"))
+    moved, other = (state_of(scenario("teeth", engagement={"share": share})) for share in (0.26, 0.34))
+    predictor = bench.predictors[0]
+
+    def summed(state):
+        model = Model(
+            state.drive, load_inertia_kg_m2=0.5, audited=False, seed=state.seed, table_for=predictor.table_for
+        )
+        return isinstance(model.teeth.mesh, TeethMesh)
+
+    assert [summed(state) for state in (base, moved, other)] == [False, True, True]
+    _, whole = both(bench, moved)
+    follow_teeth(bench, base, moved)
+    assert [summed(state) for state in (base, moved, other)] == [False, False, True]
+    table, _ = both(bench, moved)
+    assert max(short_cut_of(bench, table, whole).error.values()) < LIMIT
+    follow_teeth(bench, base, other)
+    assert [summed(state) for state in (base, moved, other)] == [False, True, False]
 
 
 def test_a_short_cut_that_errs_too_far_is_not_taken(monkeypatch):
