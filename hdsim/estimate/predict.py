@@ -32,14 +32,11 @@ from hdsim.estimate.zeros import Zero, between_zeros
 if TYPE_CHECKING:
     from hdsim.actuation.arm import Arm
     from hdsim.actuation.signal_data import SignalData
-    from hdsim.drive.model import Model
     from hdsim.drive.parameters import Drive
     from hdsim.parts import Effect
 
 #: Time for which the model runs before the record begins, so that its own oscillation has died away, s.
 LEAD_IN_S = 0.5
-#: Part of the first unbalance that is none, and most of Newton's steps to it.
-BALANCED, BALANCE_STEPS = 1e-6, 20
 #: Name of the torque that a model's output carries, where the sensor's reading is given.
 CARRIED = "carried_torque"
 #: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
@@ -265,7 +262,6 @@ class Predictor:
             raise PredictionError(str(error)) from None
         for side in {"ring", "output"} & set(model.place_of):
             model.system.y0[model.place_of[side]] = self._zero
-        begin_balanced(model)
         self.runs += 1
         asked = dict.fromkeys(self.plan.channels)
         if self._slow is not None:
@@ -285,39 +281,6 @@ class Predictor:
                 own = own - self._slow.of(own) if np.any(own) else own
                 found["output_torque"] = self.slow_torque + own
         return found
-
-
-def begin_balanced(model: Model) -> None:
-    """Let a model begin with ring and output where their torques cancel, if that is found.
-
-    A load that hangs on the drive has wound it up before the record begins. From rest at the ideal gear's
-    angle it would fall into its spring and swing for longer than any lead-in.
-
-    Args:
-        model: its initial state is changed; velocities stay those of the ideal gear.
-    """
-    system = model.system
-    places = np.array([at for name, at in model.place_of.items() if name != "motor"])
-    if not places.size:
-        return
-    y = system.y0.copy()
-    pull = system.rhs(0.0, y)[places + 1].copy()
-    first = float(np.linalg.norm(pull))
-    for _ in range(BALANCE_STEPS):
-        if not first or np.linalg.norm(pull) <= BALANCED * first:
-            system.y0[:] = y
-            return
-        yields = system.jacobian(0.0, y)[np.ix_(places + 1, places)]
-        step, *_ = np.linalg.lstsq(yields, -pull, rcond=None)
-        for part in (1.0, 0.5, 0.25, 0.1):
-            there = y.copy()
-            there[places] += part * step
-            now = system.rhs(0.0, there)[places + 1].copy()
-            if np.linalg.norm(now) < np.linalg.norm(pull):
-                y, pull = there, now
-                break
-        else:
-            return
 
 
 class PredictionError(ArithmeticError):

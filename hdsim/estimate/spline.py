@@ -114,11 +114,6 @@ def drawn_anew(
     # A loop's hiccup is no noise of the sensor: the median does not see it.
     rest = values - smooth
     left = min(float(np.var(rest)), float(np.median(np.abs(rest)) / 0.6745) ** 2)
-    # A least-squares spline follows its readings' noise by as many of them as it has numbers.
-    free = len(values) - (len(breaks) + 2)
-    if free <= 0:
-        return None
-    left *= len(values) / free
     white = np.sqrt(max(left - step**2 / 12.0, 0.0))
     drawn = smooth + white * rng.standard_normal(len(values))
     drawn = np.round(drawn / step) * step if step > 0 else drawn

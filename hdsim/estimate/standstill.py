@@ -73,36 +73,19 @@ def hear_standstill(
         for s in bench.series
     ]
     with contextlib.suppress(PredictionError):
-        matters = _matters(bench, before, bench.predict(given), turning)
-        if matters or _holds(bench, found.predictions, turning):
+        if _matters(bench, before, bench.predict(given), turning):
             for series, rows in zip(bench.series, turning, strict=True):
                 # Of a record that hardly turns, what it has is better than nothing.
                 if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
                     series.train, series.hold = series.train & rows, series.hold & rows
             sharper = anew()
-            if not matters or _likelier(bench, found.predictions, sharper.predictions):
+            if _likelier(bench, found.predictions, sharper.predictions):
                 return sharper
     for smoothing, predictor in kept:
         predictor.smoothing = smoothing
     for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
         series.train, series.hold, series.sigma = train, hold, sigma
     return None
-
-
-def _holds(bench: Bench, found: Sequence[Array], turning: Sequence[Mask]) -> bool:
-    """Whether the motor's torque at rest is clearly less likely than while it turns: the drive holds there.
-
-    Where the speed is known no better than the smooth sign's own, there is no sharper one to be asked.
-    """
-    worse = 0.0
-    for series, rest, turns in zip(bench.series, bench.residuals(found), turning, strict=True):
-        moves, rests = series.train & turns, series.train & ~turns
-        if series.channel != "motor_torque" or not len(rest) or not moves.any() or not rests.any():
-            continue
-        power = max(float(np.mean(rest[moves] ** 2)), series.noise**2)
-        independent = correlation(rest[rests], series.block[rests])
-        worse += 0.5 * (float(np.sum(rest[rests] ** 2)) / power - float(rests.sum())) / independent
-    return worse > CLEARLY
 
 
 def _matters(bench: Bench, before: Sequence[Array], now: Sequence[Array], turning: Sequence[Mask]) -> bool:
