@@ -212,7 +212,7 @@ def written(verdict: Verdict, pictures: Collection[str]) -> str:
         commands += f"hdsim run {verdict.scenario}    # the model with the result\n"
     if verdict.scenario_with_curve:
         name = Path(verdict.scenario_with_curve).name
-        rows.insert(3, [name, "that model with the curve of what the identified effects leave"])
+        rows.insert(3, [name, "that model with the curve of the remaining residual"])
     if verdict.next_experiment is not None and verdict.next_experiment.scenario:
         rows.insert(3, [Path(verdict.next_experiment.scenario).name, "the next experiment"])
         commands += f"hdsim run {verdict.next_experiment.scenario}    # the next experiment\n"

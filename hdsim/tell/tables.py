@@ -30,7 +30,7 @@ def gap_rows(verdict: Verdict) -> list[list[str]]:
 
 
 def with_curve_words(verdict: Verdict) -> str:
-    """Held-out residuals with the curve of what the effects leave; empty where it is not borne out."""
+    """Held-out residuals with the curve of the remaining residual; empty where it is not confirmed."""
     said = []
     for channel, gap in verdict.gap.items():
         if gap.with_curve is not None:

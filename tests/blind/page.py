@@ -117,7 +117,7 @@ def _measures(lines: Sequence[Line]) -> dict[str, tuple[int, int]]:
         closable, lambda r: r["closed"] >= CLOSED
     )
     curved = [r for r in closable if r.get("closed_with_curve") is not None]
-    found["the same with the curve of what the effects leave"] = share(
+    found["the same with the curve of the remaining residual"] = share(
         curved, lambda r: r["closed_with_curve"] >= CLOSED
     )
     given = [r for r in hidden if r.get("closed_since_before") is not None and min(r["strength"]) >= CLEAR]
