@@ -132,7 +132,10 @@ def fit_curve(
     if best is None or best[0] < LEAST_SHARE:
         return None
     share, kind, at, added, columns, found = best
-    fitted, spread = solved(bench, fit, left, at, added, columns, found)
+    both = solved(bench, fit, left, at, added, columns, found)
+    if both is None:
+        return None
+    fitted, spread = both
     coefficients = np.array(fitted.state.added[-1].coefficients)
     unit = unit_of(fit.state, kind)
     low, high = unit * (coefficients - 2.0 * spread), unit * (coefficients + 2.0 * spread)

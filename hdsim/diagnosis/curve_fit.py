@@ -103,8 +103,10 @@ def _basis(at: Array, period: float | None, x: Array) -> Array:
 
 def solved(
     bench: Bench, fit: Fit, left: Residual, at: Array, added: Added, columns: Array, found: Penalised
-) -> tuple[Fit, Array]:
+) -> tuple[Fit, Array] | None:
     """The model with the curve, and the standard deviations of its coefficients, shape (k,).
+
+    None where it leaves more than the model without.
 
     The traces stay those of the start (a chord method): a second step takes up what is not linear in them.
     The variances are the sum of two: that of the Bayesian view of the penalty, which covers the smoothing's
@@ -128,6 +130,7 @@ def solved(
     theta = np.zeros(len(fit.frees))
     chosen: tuple[float, State, list[Array], Array] | None = None
     rest = bench.stacked(bench.residuals(fit.predictions))
+    before = float(rest @ rest)
     # Delays stay where they are: nothing bounds them here.
     moving = np.array([not free.step for free in fit.frees], dtype=float)
     own = np.hstack([fit.columns[:, : len(fit.frees)] * moving, bench.offset_columns()])
@@ -153,11 +156,12 @@ def solved(
         predictions = bench.predict(state)
         rest = bench.stacked(bench.residuals(predictions))
         loss = float(rest @ rest)
-        if chosen is not None and loss >= chosen[0]:
+        if not loss < (before if chosen is None else chosen[0]):
             break
         chosen = (loss, state, predictions, theta)
         right = projected.T @ left.project(rest)
-    assert chosen is not None
+    if chosen is None:
+        return None
     loss, state, predictions, theta = chosen
     rest = bench.stacked(bench.residuals(predictions))
     used = np.unique(blocks)

@@ -79,7 +79,9 @@ def stand_ins(
     """Two names of which either alone explains nearly all that both do: one effect.
 
     No formula is exact to more than ``MISMATCH`` of what it explains. Where the other name takes up no more
-    than that, whichever of the two is left out, it is no effect beside it but another formula of the same.
+    than that in any channel, whichever of the two is left out, it is no effect beside it but another formula
+    of the same. Each channel is asked: an encoder that resolves much would hide that only one of two explains
+    a torque (an arm's weight and an error of the output's turn).
 
     Args:
         bench: the measured series.
@@ -91,7 +93,13 @@ def stand_ins(
         Which of the names stays, and which is an alternative to it, as their numbers; None where there are no
         such two.
     """
-    whole = bench.power(current.predictions)
+    noise, whole = bench.noise_powers, bench.channel_powers(current.predictions)
+
+    def lack(rest: Fit, both: dict[str, float]) -> float:
+        """Largest part of what both explain in a channel that one of them does not."""
+        powers = bench.channel_powers(rest.predictions)
+        return max((powers[c] - whole[c]) / part for c, part in both.items())
+
     for j, k in combinations(range(len(named)), 2):
         less_j, less_k = others[j], others[k]
         if named[j].name == named[k].name or not confusable(named[j].name, named[k].name):
@@ -101,9 +109,12 @@ def stand_ins(
         neither = without(bench, less_k, j)
         if neither is None:
             continue
-        both = bench.power(neither.predictions) - whole
-        lacks = {j: bench.power(less_k.predictions) - whole, k: bench.power(less_j.predictions) - whole}
-        if max(lacks.values()) > MISMATCH * both:
+        both = {c: power - whole[c] for c, power in bench.channel_powers(neither.predictions).items()}
+        both = {c: part for c, part in both.items() if part > EXCESS * noise[c]}
+        if not both:
+            continue
+        lacks = {j: lack(less_k, both), k: lack(less_j, both)}
+        if max(lacks.values()) > MISMATCH:
             continue
         # A law at the end of its range stands for one that it is not.
         ends = {j: less_k.state.added[j].at_limit, k: less_j.state.added[k - 1].at_limit}
