@@ -106,7 +106,7 @@ def solved(
 ) -> tuple[Fit, Array] | None:
     """The model with the curve, and the standard deviations of its coefficients, shape (k,).
 
-    None where it leaves more than the model without.
+    None where it leaves more than the model without, or no prediction follows.
 
     The traces stay those of the start (a chord method): a second step takes up what is not linear in them.
     The variances are the sum of two: that of the Bayesian view of the penalty, which covers the smoothing's
@@ -149,11 +149,13 @@ def solved(
         aim = np.concatenate([rest - columns @ step, strict * (centre - theta)])
         moved, *_ = np.linalg.lstsq(np.vstack([own, priors]), aim, rcond=1e-6)
         theta = theta + moved[: len(theta)]
-        state = scaled(fit.state, fit.frees, theta.tolist())
-        state = replace(
-            state, added=(*state.added, replace(added, coefficients=tuple(coefficients.tolist())))
-        )
-        predictions = bench.predict(state)
+        try:
+            state = scaled(fit.state, fit.frees, theta.tolist())
+            curve = replace(added, coefficients=tuple(coefficients.tolist()))
+            state = replace(state, added=(*state.added, curve))
+            predictions = bench.predict(state)
+        except ArithmeticError:  # numbers so far off that no prediction follows from them
+            break
         rest = bench.stacked(bench.residuals(predictions))
         loss = float(rest @ rest)
         if not loss < (before if chosen is None else chosen[0]):

@@ -179,3 +179,17 @@ def test_numbers_that_the_data_cannot_tell_apart_stay_by_their_priors_beside_a_c
     assert found is not None
     for free, before, after in zip(alike.frees[:2], alike.theta, found.fit.theta, strict=False):
         assert abs(after - before) < free.prior, free.name
+
+
+@pytest.mark.parametrize("factor", [-1.0, 1e-300])
+def test_a_curve_that_leaves_more_than_the_model_without_is_none(tmp_path, monkeypatch, factor):
+    """Traces of the other sign make all worse; of hardly any trace a curve follows that nothing can predict."""
+    bench, fitted, location = prepared(rigid_record(12.0, extra=catch, seed=1), scenario(tmp_path))
+    assert fit_curve(bench, fitted.fit, location) is not None
+
+    def wrong(*given):
+        columns = unit_traces(*given)
+        return None if columns is None else factor * columns
+
+    monkeypatch.setattr("hdsim.diagnosis.curve.unit_traces", wrong)
+    assert fit_curve(bench, fitted.fit, location) is None
