@@ -16,6 +16,7 @@ from hdsim.diagnosis.penalised import penalised, roughness
 from hdsim.diagnosis.screen import Residual
 from hdsim.effects.table import Table
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.numbers import scaled
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Record
@@ -181,15 +182,19 @@ def test_numbers_that_the_data_cannot_tell_apart_stay_by_their_priors_beside_a_c
         assert abs(after - before) < free.prior, free.name
 
 
-@pytest.mark.parametrize("factor", [-1.0, 1e-300])
-def test_a_curve_that_leaves_more_than_the_model_without_is_none(tmp_path, monkeypatch, factor):
-    """Traces of the other sign make all worse; of hardly any trace a curve follows that nothing can predict."""
+def test_a_curve_that_leaves_more_than_the_model_without_is_none(tmp_path, monkeypatch):
+    """Traces of the other sign make all worse."""
     bench, fitted, location = prepared(rigid_record(12.0, extra=catch, seed=1), scenario(tmp_path))
     assert fit_curve(bench, fitted.fit, location) is not None
+    monkeypatch.setattr("hdsim.diagnosis.curve.unit_traces", lambda *given: -unit_traces(*given))
+    assert fit_curve(bench, fitted.fit, location) is None
 
-    def wrong(*given):
-        columns = unit_traces(*given)
-        return None if columns is None else factor * columns
 
-    monkeypatch.setattr("hdsim.diagnosis.curve.unit_traces", wrong)
+def test_a_curve_that_carries_numbers_beyond_all_bounds_is_none(tmp_path, monkeypatch):
+    bench, fitted, location = prepared(rigid_record(12.0, extra=catch, seed=1), scenario(tmp_path))
+
+    def beyond(state, frees, theta):
+        return scaled(state, frees, [1e6] * len(theta))
+
+    monkeypatch.setattr("hdsim.diagnosis.curve_fit.scaled", beyond)
     assert fit_curve(bench, fitted.fit, location) is None
