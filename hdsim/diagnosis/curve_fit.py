@@ -128,9 +128,9 @@ def solved(
     coefficients = np.zeros(columns.shape[1])
     level = projected.sum(axis=1)
     theta = np.zeros(len(fit.frees))
-    chosen: tuple[float, State, list[Array], Array] | None = None
+    chosen: tuple[State, list[Array], Array] | None = None
     rest = bench.stacked(bench.residuals(fit.predictions))
-    before = float(rest @ rest)
+    least = float(rest @ rest)
     # Delays stay where they are: nothing bounds them here.
     moving = np.array([not free.step for free in fit.frees], dtype=float)
     own = np.hstack([fit.columns[:, : len(fit.frees)] * moving, bench.offset_columns()])
@@ -158,13 +158,13 @@ def solved(
             break
         rest = bench.stacked(bench.residuals(predictions))
         loss = float(rest @ rest)
-        if not loss < (before if chosen is None else chosen[0]):
+        if not loss < least:
             break
-        chosen = (loss, state, predictions, theta)
+        least, chosen = loss, (state, predictions, theta)
         right = projected.T @ left.project(rest)
     if chosen is None:
         return None
-    loss, state, predictions, theta = chosen
+    state, predictions, theta = chosen
     rest = bench.stacked(bench.residuals(predictions))
     used = np.unique(blocks)
     sums = np.array([(projected[blocks == b].T @ rest[blocks == b]) for b in used])

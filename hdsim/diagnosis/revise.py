@@ -81,7 +81,7 @@ def stand_ins(
     No formula is exact to more than ``MISMATCH`` of what it explains. Where the other name takes up no more
     than that in any channel, whichever of the two is left out, it is no effect beside it but another formula
     of the same. Each channel is asked: an encoder that resolves much would hide that only one of two explains
-    a torque (an arm's weight and an error of the output's turn).
+    a torque (an arm's weight and an error of the output's encoder).
 
     Args:
         bench: the measured series.

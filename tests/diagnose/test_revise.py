@@ -1,12 +1,13 @@
 """Names are asked for once more beside all others: what each is needed for, and which none needs."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
 
-from hdsim.diagnosis.revise import NEEDLESS, needed, revised
+from hdsim.diagnosis.revise import NEEDLESS, needed, revised, stand_ins
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.refit import together
 
@@ -51,3 +52,32 @@ def test_a_model_without_a_needed_name_lacks_nearly_all_that_it_explained(pair):
     without = together(pair.bench, pair.final, replace(pair.final.state, added=pair.final.state.added[:1]))
     assert needed(pair.bench, without, pair.final) > 0.9
     assert needed(pair.bench, pair.final, pair.final) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("weight_alone", "error_alone", "expected"),
+    [
+        ((12.0, 400.0), (90.0, 300.0), None),  # only the weight explains the torque
+        ((12.0, 1200.0), (16.0, 300.0), None),  # only the encoder's error explains all of the angle
+        ((12.0, 400.0), (16.0, 300.0), (0, 1)),  # parts lacking where most: 0.03 and 0.06
+        ((16.0, 400.0), (12.0, 300.0), (1, 0)),  # 0.06 and 0.02
+    ],
+)
+def test_two_names_are_one_only_where_either_alone_explains_each_channel(
+    monkeypatch, weight_alone, error_alone, expected
+):
+    """Powers of torque and angle: 110 and 10,100 with neither name, 10 and 100 (the noise) with both."""
+
+    def fitted(powers):
+        added = [SimpleNamespace(at_limit=False)] * 2
+        return SimpleNamespace(predictions=powers, state=SimpleNamespace(added=added))
+
+    bench = SimpleNamespace(
+        noise_powers={"motor_torque": 10.0, "output_angle": 100.0},
+        channel_powers=lambda powers: dict(zip(("motor_torque", "output_angle"), powers, strict=True)),
+        power=sum,
+    )
+    monkeypatch.setattr("hdsim.diagnosis.revise.without", lambda *_: fitted((110.0, 10100.0)))
+    named = [SimpleNamespace(name="unbalance"), SimpleNamespace(name="sensors")]
+    others = [fitted(error_alone), fitted(weight_alone)]
+    assert stand_ins(bench, fitted((10.0, 100.0)), named, others) == expected
