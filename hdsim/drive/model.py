@@ -150,6 +150,7 @@ class Model(Contributed):
             seed=self.seed,
             gap_growth=self._given.gap_growth,
             table_for=self._table_for,
+            odd=bool(self._given.odd_teeth),
         )
         self.teeth = with_odd_teeth(self.teeth, self._given.odd_teeth)
         kernel = _mesh.table_mesh if isinstance(self.teeth.mesh, TabulatedMesh) else _mesh.teeth_mesh

@@ -5,7 +5,7 @@ sensor of a drive hears anything. A prediction therefore
 
 * resolves the ring's twist, and its speed only by what it does to that twist (``Model.seen_scale``);
 * takes the base's own teeth, and those of the model that a search has come to, from tables that are made
-  once; teeth that a fit is moving are summed;
+  once; teeth that a fit is moving are summed, unless one of them is out of place;
 * of a ring that next to nothing damps takes the static balance (``Drive.settled``).
 
 The first two are compared with the whole model, teeth summed and the ring's speed followed ten times more

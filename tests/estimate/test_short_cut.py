@@ -146,6 +146,15 @@ def test_teeth_that_were_moved_are_summed(change):
     assert isinstance(model_of(worn, table_for=known).teeth.mesh, TeethMesh)
 
 
+def test_teeth_of_which_one_is_out_of_place_are_always_in_a_table():
+    known = frozenset({model_of(scenario("teeth")).teeth.fingerprint})
+    moved = scenario("teeth", engagement={"share": 0.26}, effects=("tooth_error",))
+    tabulated_ones, summed = (model_of(moved, table_for=given).teeth for given in (known, None))
+    assert isinstance(tabulated_ones.mesh, TabulatedMesh)
+    assert isinstance(summed.mesh, TeethMesh)
+    assert tabulated_ones.table_error < 1e-3  # of the rated torque
+
+
 def test_a_search_takes_the_teeth_that_it_has_come_to_from_a_table_too():
     bench, base = opened(scenario("teeth"))
     moved, other = (state_of(scenario("teeth", engagement={"share": share})) for share in (0.26, 0.34))
