@@ -21,6 +21,7 @@ import numpy as np
 from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import PhysicsError
 from hdsim.estimate.known_load import Gravity, arm_course
+from hdsim.estimate.lead_in import LeadInDamper
 from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
@@ -236,6 +237,8 @@ class Predictor:
             arm = self.course.part(load.arm, LEAD_IN_S)
             parts.append(arm)
             inertia += arm.inertia_kg_m2
+        if not self.plan.locked:
+            parts.append(LeadInDamper(candidate.drive, inertia, LEAD_IN_S, self.ratio))
         if self._zero:
             parts.append(Zero(self._zero))
         motions: dict[str, Any] = {"motor": self.motion}
