@@ -76,7 +76,8 @@ class Bench:
     def hear_motion(self, state: State, predictions: Sequence[Array]) -> None:
         """Add to every series' noise what the noise of the prescribed motion does to its prediction.
 
-        No more than what the model leaves of the channel: what is not there is no noise.
+        Where it does as a rule more than what the model leaves of the channel, it is less by as much: what is
+        not there is no noise.
 
         Args:
             state: the model, at fitted numbers.
@@ -104,8 +105,10 @@ class Bench:
                     change = change - (other.motor_angle - predictor.motor_angle) / predictor.ratio
                 rows = s.train | s.hold
                 if rows.any():
-                    heard = float(np.hypot(s.noise, np.std(change[rows])))
-                    heard = max(s.noise, min(heard, left.get(s.channel, heard)))
+                    own = change[rows] - change[rows].mean()
+                    as_a_rule = float(np.hypot(s.noise, np.median(np.abs(own)) / 0.6745))
+                    heard = float(np.hypot(s.noise, np.std(own)))
+                    heard = max(s.noise, heard * min(left.get(s.channel, as_a_rule) / as_a_rule, 1.0))
                     s.reading = float(np.hypot(s.reading, np.sqrt(heard**2 - s.noise**2)))
                     s.noise = heard
 

@@ -111,12 +111,11 @@ def drawn_anew(
     Returns:
         None where a knot a sample leaves no noise to be seen.
     """
-    # A loop's hiccup is no noise of the sensor: the median does not see it.
-    rest = values - smooth
-    left = min(float(np.var(rest)), float(np.median(np.abs(rest)) / 0.6745) ** 2)
-    white = np.sqrt(max(left - step**2 / 12.0, 0.0))
-    drawn = smooth + white * rng.standard_normal(len(values))
-    drawn = np.round(drawn / step) * step if step > 0 else drawn
+    free = len(values) - (len(breaks) + 2)
+    if free <= 0:
+        return None
+    rest = (values - smooth) * np.sqrt(len(values) / free)
+    drawn = smooth + rest * rng.choice((-1.0, 1.0), len(values))
     knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
     try:
         return pieces_of(least_squares_spline(time, drawn, knots))[1]
