@@ -149,9 +149,10 @@ class Predictor:
 
     @cached_property
     def speed_noise(self) -> float:
-        """Standard deviation of what the motion's noise does to the motor's speed, rad/s."""
+        """Standard deviation of what the motion's noise does to the motor's speed as a rule, rad/s."""
         again = self._moved(np.random.default_rng([0, 11])).motor_velocity
-        return float(np.sqrt(np.mean((again - self.motor_velocity) ** 2)))
+        # The median: a loop's hiccup is no noise of the sensor.
+        return float(np.median(np.abs(again - self.motor_velocity))) / 0.6745
 
     @property
     def angle_noise(self) -> float:

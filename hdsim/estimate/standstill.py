@@ -65,7 +65,7 @@ def hear_standstill(
     kept = [(predictor.smoothing, predictor) for predictor in bench.predictors]
     masks = [(series.train, series.hold, series.sigma) for series in bench.series]
     for predictor in bench.predictors:
-        predictor.smoothing = resolution(predictor.motor_velocity, predictor.speed_noise)
+        predictor.smoothing = resolution(predictor.speed_noise)
     turning = [
         ~at_rest(bench.predictors[s.record])
         if s.channel == "motor_torque"
@@ -112,23 +112,21 @@ def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> 
     return better > CLEARLY
 
 
-def resolution(speed: Array, noise: float) -> float:
-    """Smoothing speed of the sign of a measured speed, rad/s; at most that of the effects' own formulas.
+def resolution(noise: float) -> float:
+    """Smoothing speed of the sign of a speed, rad/s; at most that of the effects' own formulas.
 
-    A speed is known no better than its noise, nor than what it changes by between two samples.
+    What the speed changes by between two samples does not count: near a reversal no sample does (``BESIDE``).
 
     Args:
-        speed: shape (n,), rad/s.
-        noise: its standard deviation, rad/s.
+        noise: standard deviation of the speed, rad/s.
     """
-    between = float(np.median(np.abs(np.diff(speed))))
-    return float(np.clip(SMOOTHED * np.hypot(noise, between), STICKS_RAD_PER_S, RESOLVED_RAD_PER_S))
+    return float(np.clip(SMOOTHED * noise, STICKS_RAD_PER_S, RESOLVED_RAD_PER_S))
 
 
 def at_rest(predictor: Predictor) -> Mask:
     """Samples of a record at which its motor may rest or reverse, and those next to them, shape (n,)."""
     speed = predictor.motor_velocity
-    smoothing = resolution(speed, predictor.speed_noise)
+    smoothing = resolution(predictor.speed_noise)
     return standing(speed, smoothing, predictor.motor_angle, SEEN * predictor.angle_noise)
 
 
