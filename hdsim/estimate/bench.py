@@ -73,45 +73,6 @@ class Bench:
             )
         self.blocks += count
 
-    def hear_motion(self, state: State, predictions: Sequence[Array]) -> None:
-        """Add to every series' noise what the noise of the prescribed motion does to its prediction.
-
-        Where it does as a rule more than what the model leaves of the channel, it is less by as much: what is
-        not there is no noise.
-
-        Args:
-            state: the model, at fitted numbers.
-            predictions: its predictions.
-        """
-        left: dict[str, float] = {}
-        for s, rest in zip(self.series, self.residuals(predictions), strict=True):
-            if len(rest) and s.train.any():
-                # The median: the stretches that something missing stirs up least.
-                own = float(np.median(np.abs(rest[s.train]))) / 0.6745
-                left[s.channel] = max(own, left.get(s.channel, 0.0))
-        candidate = state.candidate()
-        for index, predictor in enumerate(self.predictors):
-            other = predictor.disturbed()
-            try:
-                here, there = predictor.predict(candidate), other.predict(candidate)
-            except PredictionError:
-                continue
-            for s in self.series:
-                if s.record != index:
-                    continue
-                change = state.reading(s.channel, self._time(s), there[s.channel] - here[s.channel])
-                if s.channel == "output_angle" and not predictor.plan.locked:
-                    # It is compared beside the motor's angle, which has moved as well.
-                    change = change - (other.motor_angle - predictor.motor_angle) / predictor.ratio
-                rows = s.train | s.hold
-                if rows.any():
-                    own = change[rows] - change[rows].mean()
-                    as_a_rule = float(np.hypot(s.noise, np.median(np.abs(own)) / 0.6745))
-                    heard = float(np.hypot(s.noise, np.std(own)))
-                    heard = max(s.noise, heard * min(left.get(s.channel, as_a_rule) / as_a_rule, 1.0))
-                    s.reading = float(np.hypot(s.reading, np.sqrt(heard**2 - s.noise**2)))
-                    s.noise = heard
-
     @property
     def channels(self) -> tuple[str, ...]:
         """The predicted channels, each once."""
@@ -205,7 +166,7 @@ class Bench:
         candidate = state.candidate()
         found: list[Mapping[str, Array]] = [p.predict(candidate) for p in self.predictors[:reach]]
         return [
-            state.reading(s.channel, self._time(s), found[s.record][s.channel])
+            state.reading(s.channel, self.time_of(s), found[s.record][s.channel])
             if s.record < reach
             else np.zeros(0)
             for s in self.series
@@ -214,11 +175,12 @@ class Bench:
     def reread(self, predictions: Sequence[Array], before: State, now: State) -> list[Array]:
         """Predictions of a state that differs from ``before`` in the readings' gain and delays only."""
         return [
-            now.reading(s.channel, self._time(s), values, before) if len(values) else values
+            now.reading(s.channel, self.time_of(s), values, before) if len(values) else values
             for s, values in zip(self.series, predictions, strict=True)
         ]
 
-    def _time(self, series: Series) -> Array:
+    def time_of(self, series: Series) -> Array:
+        """Times of a series' samples, shape (n,), s."""
         return self.predictors[series.record].record.time
 
     @contextlib.contextmanager

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdsim.errors import InputError
-from hdsim.estimate.noise import quantisation_step
-from hdsim.estimate.spline import drawn_anew, smoothed
+from hdsim.estimate.spline import drawn_anew, pieces_of, spline_through
 
 if TYPE_CHECKING:
     from hdsim.actuation.arm import Arm, Course
@@ -57,11 +56,11 @@ def arm_course(record: Record, arm: Arm, rng: np.random.Generator | None = None)
         name: motion.values(times + record.begins_s)[:3] for name, motion in arm.joints.items()
     }
     for name, values in record.joints.items():
-        breaks, coefficients = smoothed(record.time, values, motion=True)
-        angle = PPoly(coefficients[::-1], breaks)
+        spline, _ = spline_through(record.time, values, motion=True)
+        breaks, coefficients = pieces_of(spline)
         if rng is not None:
-            step = quantisation_step(values)
-            drawn = drawn_anew(record.time, values, angle(record.time), breaks, step, rng)
-            angle = angle if drawn is None else PPoly(drawn[::-1], breaks)
+            drawn = drawn_anew(record.time, values, spline, rng)
+            coefficients = coefficients if drawn is None else drawn
+        angle = PPoly(coefficients[::-1], breaks)
         motions[name] = np.array([angle(times), angle(times, 1), angle(times, 2)])
     return arm.along(times, motions)

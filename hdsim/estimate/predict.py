@@ -81,8 +81,9 @@ class Predictor:
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
         rate = None if rate is None else (self._means.behind(rate[0]), rate[1])
-        spline, self._likeliest = spline_through(record.time, values, motion=moves, step=step, rate=rate)
-        breaks, coefficients = pieces_of(spline)
+        through = spline_through(record.time, values, motion=moves, step=step, rate=rate)
+        self._spline, self._likeliest = through
+        breaks, coefficients = pieces_of(self._spline)
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
         self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
         coefficients = coefficients * self._factor
@@ -166,11 +167,10 @@ class Predictor:
         if self._likeliest is not None:
             coefficients: Array | None = pieces_of(self._likeliest.disturbed(rng))[1]
         else:
-            smooth, step = self.motor_angle / self._factor, self._step(self.plan.motion)
-            coefficients = drawn_anew(self.record.time, self._reading, smooth, self._breaks, step, rng)
+            coefficients = drawn_anew(self.record.time, self._reading, self._spline, rng)
         if coefficients is not None:
             found._coefficients = self._factor * coefficients
-            found.turn(0.0)
+            found.turn(float(self.motor_angle[0] - self._factor * self._spline(self.record.time[0])))
         return found
 
     def _step(self, channel: str) -> float:

@@ -13,6 +13,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation, robust_covariance
 from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
 from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
+from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.records import Array
 from hdsim.estimate.standstill import hear_standstill
@@ -106,7 +107,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     sharper = hear_standstill(bench, state, before, found, lambda: _roughly(bench, state, freedoms)[1])
     if sharper is not None:
         before, found = bench.predict(state), sharper
-    bench.hear_motion(found.state, found.predictions)
+    hear_motion(bench, (state, found.state), found.predictions)
     hear_flanks(bench, found.state)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
     # still hold much of it leaves what the next one finds.

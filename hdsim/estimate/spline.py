@@ -96,31 +96,35 @@ def spline_through(
 
 
 def drawn_anew(
-    time: Array, values: Array, smooth: Array, breaks: Array, step: float, rng: np.random.Generator
+    time: Array, values: Array, spline: BSpline | CubicSpline, rng: np.random.Generator
 ) -> Array | None:
     """Cubic coefficients (4, k), over the same knots, of a reading drawn about a spline with its noise.
+
+    The noise is what the spline leaves, each with a sign of its own (the wild bootstrap: Wu 1986, Annals of
+    Statistics 14:1261): more where a clock jitters and the shaft is fast, or at a corner that the spline
+    rounds off. A spline of k numbers leaves the part 1 - k / n of the readings' variance.
 
     Args:
         time: shape (n,), s.
         values: as read, shape (n,).
-        smooth: the spline through them, shape (n,).
-        breaks: its knots, shape (k + 1,).
-        step: q of the sensor.
+        spline: through them.
         rng: of the draw.
 
     Returns:
         None where a knot a sample leaves no noise to be seen.
     """
-    free = len(values) - (len(breaks) + 2)
-    if free <= 0:
+    from scipy.interpolate import BSpline
+
+    n = len(time)
+    if not isinstance(spline, BSpline) or len(spline.c) >= n:
         return None
-    rest = (values - smooth) * np.sqrt(len(values) / free)
-    drawn = smooth + rest * rng.choice((-1.0, 1.0), len(values))
-    knots = np.concatenate([[breaks[0]] * 4, breaks[1:-1], [breaks[-1]] * 4])
+    smooth = spline(time)
+    rest = (values - smooth) * np.sqrt(n / (n - len(spline.c)))
     try:
-        return pieces_of(least_squares_spline(time, drawn, knots))[1]
+        drawn = least_squares_spline(time, smooth + rest * rng.choice((-1.0, 1.0), n), spline.t)
     except (ValueError, np.linalg.LinAlgError):
         return None
+    return pieces_of(drawn)[1]
 
 
 def best_spline(time: Array, values: Array, step: float | None = None) -> tuple[float, BSpline | None]:

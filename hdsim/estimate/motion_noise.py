@@ -1,0 +1,77 @@
+"""What the noise of a prescribed motion does to what is predicted along it.
+
+A prediction answers to its motion's errors as to the motion: a lightly damped load swings with them. That is
+noise of the comparison, though no sensor of the compared channel has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Array
+
+if TYPE_CHECKING:
+    from hdsim.estimate.bench import Bench
+    from hdsim.estimate.state import State
+
+
+def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Array]) -> None:
+    """Add to every series' noise what the noise of the prescribed motion does to its prediction.
+
+    A fit leaves least where the model answers to that noise least (regression dilution: R. J. Carroll et al.,
+    *Measurement Error in Nonlinear Models*, 2nd ed., Chapman and Hall 2006, section 1.1), as a rule by too
+    much damping: of several models the one that answers most is heard. Where that is as a rule more than a
+    channel's residual, it is less by as much: what is not there is no noise.
+
+    Args:
+        bench: the measured series; their noise is changed.
+        states: the model as given, and at fitted numbers.
+        predictions: of the last one.
+    """
+    left: dict[str, float] = {}
+    for s, rest in zip(bench.series, bench.residuals(predictions), strict=True):
+        if len(rest) and s.train.any():
+            # The median: the stretches that something missing stirs up least.
+            left[s.channel] = max(_as_a_rule(rest[s.train]), left.get(s.channel, 0.0))
+    heard = [s.noise for s in bench.series]
+    for state in states:
+        for index, change in _answers(bench, state):
+            s, rows = bench.series[index], bench.series[index].train | bench.series[index].hold
+            if not rows.any():
+                continue
+            usual = float(np.hypot(s.noise, _as_a_rule(change[rows])))
+            whole = float(np.hypot(s.noise, np.std(change[rows])))
+            # A channel without noise that is predicted without error has neither.
+            share = min(left.get(s.channel, usual) / usual, 1.0) if usual > 0.0 else 1.0
+            heard[index] = max(heard[index], whole * share)
+    for s, noise in zip(bench.series, heard, strict=True):
+        s.reading = float(np.hypot(s.reading, np.sqrt(noise**2 - s.noise**2)))
+        s.noise = noise
+
+
+def _answers(bench: Bench, state: State) -> Iterator[tuple[int, Array]]:
+    """What another reading of the motion changes in each series that a model then predicts."""
+    candidate = state.candidate()
+    for index, predictor in enumerate(bench.predictors):
+        other = predictor.disturbed()
+        try:
+            here, there = predictor.predict(candidate), other.predict(candidate)
+        except PredictionError:
+            continue
+        for k, s in enumerate(bench.series):
+            if s.record != index:
+                continue
+            change = state.reading(s.channel, bench.time_of(s), there[s.channel] - here[s.channel])
+            if s.channel == "output_angle" and not predictor.plan.locked:
+                # It is compared beside the motor's angle, which has moved as well.
+                change = change - (other.motor_angle - predictor.motor_angle) / predictor.ratio
+            yield k, change
+
+
+def _as_a_rule(values: Array) -> float:
+    """Standard deviation of a normal distribution with the same median size."""
+    return float(np.median(np.abs(values - values.mean()))) / 0.6745
