@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hdsim.diagnosis.decide import WORSE
 from hdsim.diagnosis.evidence import (
     Evidence,
     HeldOutEvidence,
@@ -53,6 +54,9 @@ def collect(
     left = last.structured * found.left.power
     project = found.left.project
     shown = shown_in(bench, found.fit)
+    held = _held(bench, predictions) if found.named else HeldOutEvidence()
+    may_hold = float(np.clip(held.slope + WORSE * held.spread, 0.0, 1.0))
+    power = bench.power(base.fit.predictions)
     return Evidence(
         stages=[_stage(stage) for stage in found.stages],
         laws=[
@@ -69,10 +73,12 @@ def collect(
         explained=max(explained, 0.0) / max(max(explained, 0.0) + left, 1e-300),
         left=last.structured,
         left_chance=1.0 if only_flanks(bench, left, project) else last.chance,
-        held=_held(bench, predictions) if found.named else HeldOutEvidence(),
+        held=held,
+        patterned=(left + may_hold * max(explained, 0.0)) / max(power, 1e-300),
         rest=None
         if nothing_but_flanks(bench, found.left.power, project)
         else _rest(bench, found.fit.predictions),
+        rest_before=_rest(bench, base.fit.predictions),
         fell=max((1.0 - g.refit / g.before for g in gap.values() if g.before > 0), default=0.0),
         moved=[i.name for i in base.moved],
     )

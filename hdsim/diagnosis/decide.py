@@ -75,16 +75,27 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
             certainty=confidence[names[0]],
             because=because,
         )
-    found = bool(evidence.laws)
-    structured = evidence.left_chance <= rules.chance and evidence.left >= rules.structured
-    left = evidence.rest.times_noise if evidence.rest is not None else 0.0
+    # An effect that is not believed tells of nothing by itself: what was there without it is asked.
+    left, rest = evidence.left, evidence.rest
+    structured = evidence.left_chance <= rules.chance
+    because.append(
+        Reason(
+            rule="structure is left by chance",
+            seen=evidence.left_chance,
+            limit=rules.chance,
+            holds=structured,
+        )
+    )
+    if evidence.laws:
+        left, rest, structured = evidence.patterned, evidence.rest_before, True
+    structured = structured and left >= rules.structured
+    times = rest.times_noise if rest is not None else 0.0
     for rule, seen, limit, holds in (
-        ("structure is left by chance", evidence.left_chance, rules.chance, structured),
-        ("part of what is left that is structure", evidence.left, rules.structured, structured),
-        ("what is left, in units of the noise", left, rules.rest, left > rules.rest),
+        ("part of what is left that is structure", left, rules.structured, structured),
+        ("what is left, in units of the noise", times, rules.rest, times > rules.rest),
     ):
         because.append(Reason(rule=rule, seen=seen, limit=limit, holds=holds))
-    if found or structured or left > rules.rest:
+    if structured or times > rules.rest:
         certainty = (1.0 - max(confidence, default=0.0)) * rules.unknown
         return Decision(kind="unknown", confidence=confidence, certainty=certainty, because=because)
     fell = evidence.fell >= rules.fall

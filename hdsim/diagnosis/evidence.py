@@ -127,8 +127,13 @@ class Evidence(Part):
     """Probability to see as much where there is no structure."""
     held: HeldOutEvidence = HeldOutEvidence()
     """What held-out data say of the added effects."""
+    patterned: float = 1.0
+    """Share of the re-fitted model's residual that is structure: what is left of it, and of what the added
+    effects explain as much as held-out data do not rule out."""
     rest: RestEvidence | None = None
     """What is left beyond the noise, wherever it lives."""
+    rest_before: RestEvidence | None = None
+    """The same of the re-fitted model, without the added effects."""
     fell: float = 0.0
     """Largest relative fall of a held-out gap by the re-fit."""
     moved: list[str] = []

@@ -18,7 +18,7 @@ from hdsim.diagnosis.name import MISMATCH, Named, confusable
 from hdsim.estimate.asked import gone_with
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
-from hdsim.estimate.fit import Fit, fit, settled
+from hdsim.estimate.fit import Fit, added_spreads, fit, settled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import together
 
@@ -28,6 +28,8 @@ EXCESS = 0.05
 #: Part of what would be missing without it below which a name is taken back (chosen: of calibration cases
 #: right ones have 0.8 to 1, wrong ones 0.1 to 0.35 and, once, 0.9).
 NEEDLESS = 0.1
+#: Chance of an effect that is not there, as for the intervals of numbers.
+BY_CHANCE = 0.05
 
 
 def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str], object]) -> Fit:
@@ -81,7 +83,8 @@ def stand_ins(
     No formula is exact to more than ``MISMATCH`` of what it explains. Where the other name takes up no more
     than that in any channel, whichever of the two is left out, it is no effect beside it but another formula
     of the same. Each channel is asked: an encoder that resolves much would hide that only one of two explains
-    a torque (an arm's weight and an error of the output's encoder).
+    a torque (an arm's weight and an error of the output's encoder). Nor are they two where neither is told
+    from nothing beside the other: then their sizes cancel, and only what they do together is.
 
     Args:
         bench: the measured series.
@@ -114,13 +117,28 @@ def stand_ins(
         if not both:
             continue
         lacks = {j: lack(less_k, both), k: lack(less_j, both)}
-        if max(lacks.values()) > MISMATCH:
+        if max(lacks.values()) > MISMATCH and (told(current, j) or told(current, k)):
             continue
         # A law at the end of its range stands for one that it is not.
         ends = {j: less_k.state.added[j].at_limit, k: less_j.state.added[k - 1].at_limit}
         kept = min((j, k), key=lambda one: (ends[one], lacks[one]))
         return kept, j + k - kept
     return None
+
+
+def told(current: Fit, k: int) -> bool:
+    """Whether the size of an effect is told from nothing, with all others beside it (Wald test).
+
+    Args:
+        current: the model with all effects.
+        k: which of them.
+    """
+    from scipy.stats import chi2
+
+    added, covariance, _ = added_spreads(current)[k]
+    sizes = np.array(added.coefficients)
+    wald = float(sizes @ np.linalg.lstsq(covariance, sizes, rcond=None)[0])
+    return wald > float(chi2.isf(BY_CHANCE, len(sizes)))
 
 
 def without(bench: Bench, current: Fit, k: int) -> Fit | None:

@@ -51,6 +51,23 @@ def test_held_out_data_that_do_excite_it_and_do_not_show_it_take_the_name_away()
     assert decide(found(law(), explained=0.9, held=held)).kind == "unknown"
 
 
+@pytest.mark.parametrize(
+    ("patterned", "times_noise", "kind"),
+    [(0.4, 1.1, "unknown"), (0.05, 2.5, "unknown"), (0.05, 1.3, "nothing")],
+)
+def test_an_effect_that_is_not_believed_tells_of_nothing_by_itself(patterned, times_noise, kind):
+    """What was there without it decides, as where nothing was proposed."""
+    before = RestEvidence(record="a", channel="b", times_noise=times_noise)
+    proposed = found(
+        law(),
+        explained=0.6,
+        held=HeldOutEvidence(slope=-0.2, spread=0.1),
+        patterned=patterned,
+        rest_before=before,
+    )
+    assert decide(proposed).kind == kind
+
+
 def test_a_number_at_the_end_of_its_range_counts_against_a_name():
     free, stuck = (decide(found(law(at_limit=a))).confidence[0] for a in (False, True))
     assert stuck < free

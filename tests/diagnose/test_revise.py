@@ -55,22 +55,32 @@ def test_a_model_without_a_needed_name_lacks_nearly_all_that_it_explained(pair):
 
 
 @pytest.mark.parametrize(
-    ("weight_alone", "error_alone", "expected"),
+    ("weight_alone", "error_alone", "sizes", "expected"),
     [
-        ((12.0, 400.0), (90.0, 300.0), None),  # only the weight explains the torque
-        ((12.0, 1200.0), (16.0, 300.0), None),  # only the encoder's error explains all of the angle
-        ((12.0, 400.0), (16.0, 300.0), (0, 1)),  # parts lacking where most: 0.03 and 0.06
-        ((16.0, 400.0), (12.0, 300.0), (1, 0)),  # 0.06 and 0.02
+        ((12.0, 400.0), (90.0, 300.0), (5.0, 5.0), None),  # only the weight explains the torque
+        ((12.0, 1200.0), (16.0, 300.0), (5.0, 5.0), None),  # only the encoder's error explains all of the angle
+        ((12.0, 400.0), (16.0, 300.0), (5.0, 5.0), (0, 1)),  # parts lacking where most: 0.03 and 0.06
+        ((16.0, 400.0), (12.0, 300.0), (5.0, 5.0), (1, 0)),  # 0.06 and 0.02
+        ((12.0, 400.0), (90.0, 300.0), (1.9, 1.9), (0, 1)),  # neither size is told from nothing
+        ((12.0, 400.0), (90.0, 300.0), (1.9, 2.0), None),
     ],
 )
 def test_two_names_are_one_only_where_either_alone_explains_each_channel(
-    monkeypatch, weight_alone, error_alone, expected
+    monkeypatch, weight_alone, error_alone, sizes, expected
 ):
-    """Powers of torque and angle: 110 and 10,100 with neither name, 10 and 100 (the noise) with both."""
+    """Powers of torque and angle: 110 and 10,100 with neither name, 10 and 100 (the noise) with both.
+
+    Sizes in standard deviations: 1.96 of a single number are told from nothing.
+    """
 
     def fitted(powers):
-        added = [SimpleNamespace(at_limit=False)] * 2
-        return SimpleNamespace(predictions=powers, state=SimpleNamespace(added=added))
+        added = [SimpleNamespace(at_limit=False, coefficients=(size,)) for size in sizes]
+        return SimpleNamespace(
+            predictions=powers,
+            state=SimpleNamespace(added=added),
+            covariance=np.eye(2),
+            numbers_of=lambda k: slice(k, k + 1),
+        )
 
     bench = SimpleNamespace(
         noise_powers={"motor_torque": 10.0, "output_angle": 100.0},
