@@ -58,7 +58,7 @@ def test_a_model_without_a_needed_name_lacks_nearly_all_that_it_explained(pair):
     ("weight_alone", "error_alone", "sizes", "expected"),
     [
         ((12.0, 400.0), (90.0, 300.0), (5.0, 5.0), None),  # only the weight explains the torque
-        ((12.0, 1200.0), (16.0, 300.0), (5.0, 5.0), None),  # only the encoder's error explains all of the angle
+        ((12.0, 1200.0), (16.0, 300.0), (5.0, 5.0), None),  # only the error explains all of the angle
         ((12.0, 400.0), (16.0, 300.0), (5.0, 5.0), (0, 1)),  # parts lacking where most: 0.03 and 0.06
         ((16.0, 400.0), (12.0, 300.0), (5.0, 5.0), (1, 0)),  # 0.06 and 0.02
         ((12.0, 400.0), (90.0, 300.0), (1.9, 1.9), (0, 1)),  # neither size is told from nothing
