@@ -17,6 +17,7 @@ import numpy as np
 from hdsim.drive.parameters import ToothedMesh
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
+from hdsim.estimate.noise import usual_size
 from hdsim.estimate.numbers import Free, scaled, undeclared
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
@@ -86,7 +87,7 @@ def hear_flanks(bench: Bench, state: State) -> None:
     for series, rest in zip(bench.series, bench.residuals(own), strict=True):
         if series.train.any():
             # The median: the stretches that something missing stirs up least.
-            size = float(np.median(np.abs(rest[series.train]))) / 0.6745
+            size = usual_size(rest[series.train])
             left[series.channel] = max(size, left.get(series.channel, 0.0))
     for k, series in enumerate(bench.series):
         rows = series.train | series.hold

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdsim.estimate.knots import slopes_of
+from hdsim.estimate.noise import usual_size
 from hdsim.estimate.records import Array, Mask
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ class Motion:
         from scipy.optimize import minimize
 
         def noise(of: Array) -> float:
-            size = float(np.median(np.abs(np.diff(of, 4)))) / 0.6745 / math.sqrt(70.0)
+            size = usual_size(np.diff(of, 4)) / math.sqrt(70.0)
             return max(size, LEAST * float(np.ptp(of)), 1e-300)
 
         angle, slope = max(noise(values), self.least), noise(rate[self.trusted])

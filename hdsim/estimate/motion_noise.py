@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hdsim.estimate.noise import usual_size
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 
@@ -36,14 +37,14 @@ def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Arr
     for s, rest in zip(bench.series, bench.residuals(predictions), strict=True):
         if len(rest) and s.train.any():
             # The median: the stretches that something missing stirs up least.
-            left[s.channel] = max(_as_a_rule(rest[s.train]), left.get(s.channel, 0.0))
+            left[s.channel] = max(_spread(rest[s.train]), left.get(s.channel, 0.0))
     heard = [s.noise for s in bench.series]
     for state in states:
         for index, change in _answers(bench, state):
             s, rows = bench.series[index], bench.series[index].train | bench.series[index].hold
             if not rows.any():
                 continue
-            usual = float(np.hypot(s.noise, _as_a_rule(change[rows])))
+            usual = float(np.hypot(s.noise, _spread(change[rows])))
             whole = float(np.hypot(s.noise, np.std(change[rows])))
             # A channel without noise that is predicted without error has neither.
             share = min(left.get(s.channel, usual) / usual, 1.0) if usual > 0.0 else 1.0
@@ -72,6 +73,5 @@ def _answers(bench: Bench, state: State) -> Iterator[tuple[int, Array]]:
             yield k, change
 
 
-def _as_a_rule(values: Array) -> float:
-    """Standard deviation of a normal distribution with the same median size."""
-    return float(np.median(np.abs(values - values.mean()))) / 0.6745
+def _spread(values: Array) -> float:
+    return usual_size(values - values.mean())

@@ -119,7 +119,15 @@ def white_noise(values: Array, trusted: Mask) -> float:
         differences = differences[np.isfinite(differences)]
         if len(differences) < 10:
             break
-        # 0.6745: the median of |x| of a standard normal.
-        spread = float(np.median(np.abs(differences))) / 0.6745
-        found.append(spread / math.sqrt(math.comb(2 * order, order)))
+        found.append(usual_size(differences) / math.sqrt(math.comb(2 * order, order)))
     return min(found, default=0.0)
+
+
+def usual_size(values: Array) -> float:
+    """Standard deviation about zero of a normal distribution with the same median size, in their unit.
+
+    Args:
+        values: shape (n,); few large ones do not count.
+    """
+    # 0.6745: the median of |x| of a standard normal.
+    return float(np.median(np.abs(values))) / 0.6745

@@ -22,7 +22,7 @@ from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import PhysicsError
 from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.lead_in import LeadInDamper
-from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means
+from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means, usual_size
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
@@ -153,7 +153,7 @@ class Predictor:
         """Standard deviation of what the motion's noise does to the motor's speed as a rule, rad/s."""
         again = self._moved(np.random.default_rng([0, 11])).motor_velocity
         # The median: a loop's hiccup is no noise of the sensor.
-        return float(np.median(np.abs(again - self.motor_velocity))) / 0.6745
+        return usual_size(again - self.motor_velocity)
 
     @property
     def angle_noise(self) -> float:
