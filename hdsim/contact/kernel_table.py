@@ -97,7 +97,8 @@ def tabulate(
         )
     step = float(law.penetration(maximum_force_n)) / (nodes - 1)
     grid = step * np.arange(nodes)
-    force, slope = law.force(grid), law.stiffness(grid)
+    force = law.force(grid)
+    slope = law.stiffness_at_force(force)
     slope[0] = law.initial_stiffness_n_per_m
     c, end_energy = quartic_cells(step, force, slope)
     ends = float(force[-1]), float(slope[-1]), end_energy

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from hdsim.diagnosis.name import SAME, Named, freedom, name_effect
+from hdsim.diagnosis.name import SAME, Named, confusable, freedom, level, name_effect
 from hdsim.diagnosis.revise import without
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, screen
@@ -78,12 +78,22 @@ def again(
             age_s = rest.state.delays.get(channel, 0.0)
             peaks += order_lines(bench, residuals, channel, age_s=age_s)
         tell(f"{own.name} again")
-        screening = screen(bench, rest.state, left, peaks, before=before)
+        done = instead(one for one in names if one is not own)
+        screening = screen(bench, rest.state, left, peaks, before=before, leave_out=done)
         named = None
         if screening.ranked and screening.chance <= LEVEL:
             named = name_effect(bench, rest, screening, left, on_step=tell)
         alone = len(names) == 1
         if named is None or (not alone and gain(bench, base, rest, named.fit) < BEYOND_GAIN):
+            by_itself = as_good(bench, current, k, rest)
+            if by_itself is not None:
+                # It explains what the newest does as well.
+                beaten = names.pop().name
+                own.group[beaten] = 1.0
+                own.instead_of |= {beaten}
+                current = by_itself
+                k += 1
+                continue
             # The others explain what it did, so what it explained is theirs.
             gone, newest = names.pop(k), names[-1] if names else None
             if newest is not None and k < len(names):
@@ -110,9 +120,40 @@ def again(
                 own.group = {name: part for name, part in named.group.items() if name != own.name}
                 own.group[named.name] = 1.0
             own.gain, own.of_lines, own.alike = names[k].gain, names[k].of_lines, names[k].alike
+            own.instead_of = names[k].instead_of if own.name == names[k].name else frozenset()
             names[k] = own
         k += 1
     return current
+
+
+def as_good(bench: Bench, current: Fit, k: int, rest: Fit) -> Fit | None:
+    """The model without its newest effect where a simpler one that looks like it does as well alone.
+
+    The two have never been compared: the newest was found with the simpler one in the model, beside which it
+    explained more, and now it explains what the simpler one did. They are two names of one effect, and which
+    of them is decided as in a contest.
+
+    Args:
+        bench: the measured series.
+        current: the model with both.
+        k: which of its effects nothing is missing without.
+        rest: the model without that.
+    """
+    last, added = len(current.state.added) - 1, current.state.added
+    if k == last or added[k].freedom >= added[last].freedom:
+        return None
+    if not confusable(added[k].effect, added[last].effect):
+        return None
+    alone, neither = without(bench, current, last), without(bench, rest, last - 1)
+    if alone is None or neither is None:
+        return None
+    own, newest, none = (bench.block_powers(each.predictions) for each in (alone, rest, neither))
+    return alone if level(own, newest, SAME * float((none - newest).sum())) else None
+
+
+def instead(names: Iterable[Named]) -> frozenset[str]:
+    """Effects that are not asked for, because these names do the same."""
+    return frozenset().union(*(one.instead_of for one in names))
 
 
 def _reads(added: Added, lines: Sequence[tuple[str, float]]) -> bool:

@@ -69,6 +69,7 @@ class Named:
         worth: power that it explains beside all others; likewise, where there are others.
         less: the model without it, all the rest fitted anew; likewise.
         alike: names of which either alone explains nearly all that both do; set when they are revised.
+        instead_of: names with more freedom that do the same as this one; not asked for beside it.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Named:
     worth: float = 0.0
     less: Fit | None = None
     alike: frozenset[str] = frozenset()
+    instead_of: frozenset[str] = frozenset()
 
 
 def name_effect(
@@ -225,13 +227,15 @@ def _inside(results: list[tuple[str, Fit, Array]], before: Array) -> list[tuple[
 
 def simplest_first(results: list[tuple[str, Fit, Array]], same: float) -> list[tuple[str, Fit, Array]]:
     """The results, the one of least freedom first of those that blocks of time cannot tell from the best."""
-
-    def level(rest: Array) -> bool:
-        difference = rest - results[0][2]
-        return float(difference.sum()) <= min(2.0 * float(np.sqrt(len(rest)) * difference.std()), same)
-
-    best = min((result for result in results if level(result[2])), key=lambda result: freedom(result[1]))
+    alike = (result for result in results if level(result[2], results[0][2], same))
+    best = min(alike, key=lambda result: freedom(result[1]))
     return [best, *(result for result in results if result is not best)]
+
+
+def level(rest: Array, least: Array, same: float) -> bool:
+    """Whether what one fit leaves in every block of time is no more than another's, by chance or ``same``."""
+    difference = rest - least
+    return float(difference.sum()) <= min(2.0 * float(np.sqrt(len(rest)) * difference.std()), same)
 
 
 def freedom(found: Fit) -> int:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, left_of
+from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
 from hdsim.diagnosis.contest import Fitted
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
@@ -184,8 +184,10 @@ def _one_more(
     if stage.screening is None:
         tell = during("screen", "screening the catalogue")
         first = found.stages[0].screening
+        beaten = instead(found.named)
+        lines = stage.location.lines
         screening = screen(
-            bench, current.state, left, stage.location.lines, places=places, before=first, on_step=tell
+            bench, current.state, left, lines, places=places, before=first, leave_out=beaten, on_step=tell
         )
     else:
         screening = ranked_anew(stage.screening, left)

@@ -6,7 +6,7 @@ channels together is its trace. The cross-validated share of the residual that i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -76,6 +76,7 @@ def screen(
     *,
     places: Sequence[Place] = (),
     before: Screening | None = None,
+    leave_out: Collection[str] = (),
     on_step: Callable[[str], object] | None = None,
 ) -> Screening:
     """Rank every effect of the catalogue by the share of the residual that its trace explains.
@@ -88,6 +89,7 @@ def screen(
         places: where the residual lives; fittings with many starts are left out where theirs shows nothing.
         before: an earlier screening of these data. What an effect does is nearly the same whatever other
             effects the model has by now, so its traces serve again; those that come near are refined anew.
+        leave_out: effects that need not be tried, because one that the model has does what they do.
         on_step: told what is being tried.
     """
     found = Screening(sigmas=np.array([series.sigma for series in bench.series]))
@@ -102,6 +104,9 @@ def screen(
         fittings: tuple[Fitting, ...] = getattr(kind, "fittings", ())
         if name in present and not kind.several:
             found.skipped[name] = "the model has it"
+            continue
+        if name in leave_out:
+            found.skipped[name] = "an effect that the model has does the same with fewer numbers"
             continue
         if not fittings:
             continue  # it stands for what has no name
