@@ -1,0 +1,45 @@
+"""Names that are asked again beside the others: which of two stays that take each other's place."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdsim.diagnosis.again import as_good
+
+FRICTION, OVER_ANGLE, RIPPLE = "input_coulomb_viscous", "position_dependent_friction", "motor_torque_ripple"
+#: Blocks of time of a model with neither name, what the newest leaves in them alone, and its uncertainty.
+NEITHER, NEWEST = np.full(100, 50.0), np.tile([1.0, 3.0], 50)
+
+
+def model(*effects, powers=NEWEST):
+    added = [SimpleNamespace(effect=effect, freedom=freedom) for effect, freedom in effects]
+    return SimpleNamespace(state=SimpleNamespace(added=added), predictions=powers)
+
+
+@pytest.mark.parametrize(
+    ("first", "newest", "alone", "stays"),
+    [
+        # It leaves 0.3 more a block of the 48 that either explains, by chance: 2 x 0.2.
+        ((FRICTION, 2), (OVER_ANGLE, 6), NEWEST + np.tile([2.3, -1.7], 50), True),
+        # The same on average, in every block alike: not by chance.
+        ((FRICTION, 2), (OVER_ANGLE, 6), NEWEST + 0.3, False),
+        # By chance as far as blocks can tell, but more than 2 % of what either explains.
+        ((FRICTION, 2), (OVER_ANGLE, 6), NEWEST + np.tile([22.2, -19.8], 50), False),
+        # The newest has no more freedom: where it explains all, it has the name.
+        ((OVER_ANGLE, 6), (FRICTION, 2), NEWEST, False),
+        # Nobody takes the two for one another.
+        ((FRICTION, 2), (RIPPLE, 6), NEWEST, False),
+    ],
+)
+def test_the_simpler_of_two_that_explain_each_other_stays(monkeypatch, first, newest, alone, stays):
+    current, rest = model(first, newest), model(newest)
+
+    def without(_, whole, k):
+        return model(first, powers=alone) if whole is current else model(powers=NEITHER)
+
+    monkeypatch.setattr("hdsim.diagnosis.again.without", without)
+    bench = SimpleNamespace(block_powers=lambda powers: powers)
+    found = as_good(bench, current, 0, rest)
+    assert (found is not None) == stays
+    assert found is None or [one.effect for one in found.state.added] == [first[0]]
