@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation, robust_covariance
-from hdsim.estimate.fit import Fit, at_present, base_intervals, fit
+from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled
 from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
 from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
@@ -104,9 +104,15 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         if not (hear_beginning(bench, before) or hear_beginning(bench, found.predictions)):
             break
         before, found = _roughly(bench, state, freedoms)
-    sharper = hear_standstill(bench, state, before, found, lambda: _roughly(bench, state, freedoms)[1])
-    if sharper is not None:
-        before, found = bench.predict(state), sharper
+
+    def carried_on(each: Fit) -> Fit:
+        return together(bench, each, rough=True)
+
+    def anew() -> Fit:
+        return _roughly(bench, state, freedoms)[1]
+
+    found = hear_standstill(bench, state, before, found, anew, carried_on)
+    before = bench.predict(state)
     hear_motion(bench, (state, found.state), found.predictions)
     hear_flanks(bench, found.state)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
@@ -126,14 +132,38 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
             break
     found = _with_those_left(bench, found)
     _widened(bench, found)
-    late = with_delays(bench, found)
-    noise = sum(bench.noise_powers.values())
-    left = bench.power(found.predictions) - noise
-    if late and left > 0 and bench.power(late.predictions) - noise < ALL * left:
-        found = late
-        reweigh(bench, found)
+
+    def heard(late: Fit) -> bool:
+        """Whether fewer samples count now: what a delay leaves hides what a rest or a beginning does."""
+        rested = hear_standstill(bench, state, before, late, lambda: late, carried_on)
+        return hear_beginning(bench, rested.predictions) or rested is not late
+
+    found = _delayed(bench, found, heard)
     widen_by_flanks(bench, found)
     return Refit(found, freedoms, base_intervals(found, freedoms), before)
+
+
+def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
+    """The fit with the torques' delays, where they explain what it leaves.
+
+    Args:
+        bench: the measured series.
+        found: the fit without them.
+        heard: whether samples no longer count that leave more than the others with the delays.
+    """
+    late = with_delays(bench, found)
+    if late is None or bench.power(found.predictions) <= sum(bench.noise_powers.values()):
+        return found
+    if heard(late):
+        found = settled(bench, together(bench, found, rough=True))
+        _widened(bench, found)
+        reweigh(bench, found)
+        late = with_delays(bench, found) or found
+    noise = sum(bench.noise_powers.values())
+    if bench.power(late.predictions) - noise >= ALL * (bench.power(found.predictions) - noise):
+        return found
+    reweigh(bench, late)
+    return late
 
 
 def _roughly(bench: Bench, state: State, freedoms: Sequence[Free]) -> tuple[list[Array], Fit]:

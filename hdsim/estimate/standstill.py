@@ -13,6 +13,7 @@ wrong one bends friction to make up for it, so each is judged by a fit of its ow
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -43,8 +44,13 @@ CLEARLY = 5.0
 
 
 def hear_standstill(
-    bench: Bench, given: State, before: Sequence[Array], found: Fit, anew: Callable[[], Fit]
-) -> Fit | None:
+    bench: Bench,
+    given: State,
+    before: Sequence[Array],
+    found: Fit,
+    anew: Callable[[], Fit],
+    carried_on: Callable[[Fit], Fit],
+) -> Fit:
     """Take the sign of friction as sharp as the speed is known, where that is clearly likelier.
 
     The motor's torque at rest counts no longer then.
@@ -55,17 +61,25 @@ def hear_standstill(
         before: its predictions.
         found: the model fitted.
         anew: makes a fit like that under the sharper sign.
+        carried_on: carries a fit on to its end: of two that are on their way, the nearer one would seem
+            likelier.
 
     Returns:
-        That fit, where the sharper sign was taken.
+        The fit under the sign that was taken.
     """
     friction = given.drive.friction
     if not friction.sticks or max(friction.coulomb_nm, friction.load_coefficient) == 0.0:
-        return None
-    kept = [(predictor.smoothing, predictor) for predictor in bench.predictors]
+        return found
+    signs = [predictor.smoothing for predictor in bench.predictors]
+    sharp = [resolution(predictor.speed_noise) for predictor in bench.predictors]
+    if signs == sharp:
+        return found
     masks = [(series.train, series.hold, series.sigma) for series in bench.series]
-    for predictor in bench.predictors:
-        predictor.smoothing = resolution(predictor.speed_noise)
+
+    def take(smoothing: Sequence[float]) -> None:
+        for predictor, speed in zip(bench.predictors, smoothing, strict=True):
+            predictor.smoothing = speed
+
     turning = [
         ~at_rest(bench.predictors[s.record])
         if s.channel == "motor_torque"
@@ -73,19 +87,25 @@ def hear_standstill(
         for s in bench.series
     ]
     with contextlib.suppress(PredictionError):
-        if _matters(bench, before, bench.predict(given), turning):
+        take(sharp)
+        matters = _matters(bench, before, bench.predict(given), turning)
+        take(signs)
+        if matters or _held(bench, found.predictions, turning) > CLEARLY:
+            found = carried_on(found)
+            held = _held(bench, found.predictions, turning)
+            take(sharp)
             for series, rows in zip(bench.series, turning, strict=True):
                 # Of a record that hardly turns, what it has is better than nothing.
                 if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
                     series.train, series.hold = series.train & rows, series.hold & rows
-            sharper = anew()
-            if _likelier(bench, found.predictions, sharper.predictions):
+            sharper = carried_on(anew())
+            turned = _likelier(bench, found.predictions, sharper.predictions)
+            if turned > CLEARLY or (turned > -CLEARLY and turned + held > CLEARLY):
                 return sharper
-    for smoothing, predictor in kept:
-        predictor.smoothing = smoothing
+    take(signs)
     for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
         series.train, series.hold, series.sigma = train, hold, sigma
-    return None
+    return found
 
 
 def _matters(bench: Bench, before: Sequence[Array], now: Sequence[Array], turning: Sequence[Mask]) -> bool:
@@ -97,8 +117,8 @@ def _matters(bench: Bench, before: Sequence[Array], now: Sequence[Array], turnin
     return seen > CLEARLY
 
 
-def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> bool:
-    """Whether the sharper sign explains the motor's torque clearly better, where that counts."""
+def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> float:
+    """Log-likelihood by which the sharper sign explains the motor's torque better, where that counts."""
     better = 0.0
     for series, before, now in zip(
         bench.series, bench.residuals(smooth), bench.residuals(sharp), strict=True
@@ -109,7 +129,26 @@ def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> 
         before, now = before[rows], now[rows]
         independent = correlation(now, series.block[rows]) * max(float(np.mean(now**2)), series.noise**2)
         better += 0.5 * (float(np.sum(before**2)) - float(np.sum(now**2))) / independent
-    return better > CLEARLY
+    return better
+
+
+def _held(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> float:
+    """Log-likelihood by which the motor's torque is missed more at rest than while the shaft turns.
+
+    Of two variances against one (Gaussian likelihood ratio), for as many independent samples as there are at
+    rest. What is missing while the shaft turns is missing at rest as well, and says nothing of it.
+    """
+    better = 0.0
+    for series, left, rows in zip(bench.series, bench.residuals(smooth), turning, strict=True):
+        turned, rest = series.train & rows, series.train & ~rows
+        if series.channel != "motor_torque" or not len(left) or not (turned.any() and rest.any()):
+            continue
+        usual = max(float(np.mean(left[turned] ** 2)), series.noise**2)
+        more = float(np.mean(left[rest] ** 2)) / usual
+        independent = rest.sum() / correlation(left[rest], series.block[rest])
+        if more > 1.0:
+            better += 0.5 * independent * (more - 1.0 - math.log(more))
+    return better
 
 
 def resolution(noise: float) -> float:
@@ -130,6 +169,12 @@ def at_rest(predictor: Predictor) -> Mask:
     return standing(speed, smoothing, predictor.motor_angle, SEEN * predictor.angle_noise)
 
 
+def runs(rows: Mask) -> list[tuple[int, int]]:
+    """First sample of each run of true ones, and the one behind it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
 def standing(speed: Array, smoothing: float, angle: Array | None = None, least_rad: float = 0.0) -> Mask:
     """Samples at which the shaft may rest or reverse, and those next to them, shape (n,).
 
@@ -148,8 +193,7 @@ def standing(speed: Array, smoothing: float, angle: Array | None = None, least_r
     slow[1:] |= turned
     slow[:-1] |= turned
     if angle is not None:
-        edges = np.flatnonzero(np.diff(np.concatenate([[True], slow, [True]]).astype(int)))
-        for first, end in zip(edges[::2], edges[1::2], strict=True):
+        for first, end in runs(~slow):
             # From the slow sample before to the one behind.
             if abs(angle[min(end, len(angle) - 1)] - angle[max(first - 1, 0)]) < least_rad:
                 slow[first:end] = True
