@@ -105,13 +105,13 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
             break
         before, found = _roughly(bench, state, freedoms)
 
-    def carried_on(each: Fit) -> Fit:
-        return together(bench, each, rough=True)
-
     def anew() -> Fit:
         return _roughly(bench, state, freedoms)[1]
 
-    found = hear_standstill(bench, state, before, found, anew, carried_on)
+    def at_its_end(each: Fit) -> Fit:
+        return _at_its_end(bench, each)
+
+    found = hear_standstill(bench, state, before, found, anew, at_its_end, by_rests=False)
     before = bench.predict(state)
     hear_motion(bench, (state, found.state), found.predictions)
     hear_flanks(bench, found.state)
@@ -135,7 +135,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
 
     def heard(late: Fit) -> bool:
         """Whether fewer samples count now: what a delay leaves hides what a rest or a beginning does."""
-        rested = hear_standstill(bench, state, before, late, lambda: late, carried_on)
+        rested = hear_standstill(bench, state, before, late, lambda: late, at_its_end, by_rests=True)
         return hear_beginning(bench, rested.predictions) or rested is not late
 
     found = _delayed(bench, found, heard)
@@ -173,6 +173,17 @@ def _roughly(bench: Bench, state: State, freedoms: Sequence[Free]) -> tuple[list
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)
     return before, found
+
+
+def _at_its_end(bench: Bench, found: Fit) -> Fit:
+    """A fit carried on under weights that follow what it leaves, until they stay."""
+    for _ in range(WEIGHINGS):
+        found = together(bench, found, rough=True)
+        before = [series.sigma for series in bench.series]
+        bench.weigh(bench.residuals(found.predictions))
+        if max(old / series.sigma for old, series in zip(before, bench.series, strict=True)) < ALIKE:
+            break
+    return found
 
 
 def _with_those_left(bench: Bench, found: Fit) -> Fit:
