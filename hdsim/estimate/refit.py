@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -108,10 +109,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
     def anew() -> Fit:
         return _roughly(bench, state, freedoms)[1]
 
-    def at_its_end(each: Fit) -> Fit:
-        return _at_its_end(bench, each)
-
-    found = hear_standstill(bench, state, before, found, anew, at_its_end, by_rests=False)
+    found = hear_standstill(bench, state, before, found, anew)
     before = bench.predict(state)
     hear_motion(bench, (state, found.state), found.predictions)
     hear_flanks(bench, found.state)
@@ -135,12 +133,12 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
 
     def heard(late: Fit) -> bool:
         """Whether fewer samples count now: what a delay leaves hides what a rest or a beginning does."""
-        rested = hear_standstill(bench, state, before, late, lambda: late, at_its_end, by_rests=True)
+        rested = hear_standstill(bench, state, before, late, lambda: late, partial(_at_its_end, bench))
         return hear_beginning(bench, rested.predictions) or rested is not late
 
     found = _delayed(bench, found, heard)
     widen_by_flanks(bench, found)
-    return Refit(found, freedoms, base_intervals(found, freedoms), before)
+    return Refit(found, freedoms, base_intervals(found, freedoms), bench.predict(state))
 
 
 def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
@@ -158,6 +156,8 @@ def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
         found = settled(bench, together(bench, found, rough=True))
         _widened(bench, found)
         reweigh(bench, found)
+        if bench.power(found.predictions) <= REACHED * sum(bench.noise_powers.values()):
+            return found
         late = with_delays(bench, found) or found
     noise = sum(bench.noise_powers.values())
     if bench.power(late.predictions) - noise >= ALL * (bench.power(found.predictions) - noise):

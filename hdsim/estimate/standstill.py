@@ -49,9 +49,7 @@ def hear_standstill(
     before: Sequence[Array],
     found: Fit,
     anew: Callable[[], Fit],
-    carried_on: Callable[[Fit], Fit],
-    *,
-    by_rests: bool,
+    carried_on: Callable[[Fit], Fit] | None = None,
 ) -> Fit:
     """Take the sign of friction as sharp as the speed is known, where that is clearly likelier.
 
@@ -63,10 +61,8 @@ def hear_standstill(
         before: its predictions.
         found: the model fitted.
         anew: makes a fit like that under the sharper sign.
-        carried_on: carries a fit on to its end: of two that are on their way, the nearer one would seem
-            likelier.
-        by_rests: whether rests may tell what the turning shaft does not: with a delay that is not known yet
-            every reversal is missed.
+        carried_on: carries a fit on to its end; None for a first look at fits that are on their way, of which
+            the nearer one seems likelier. A second look needs a reason: torque that is missed at rest.
 
     Returns:
         The fit under the sign that was taken.
@@ -91,24 +87,21 @@ def hear_standstill(
         for s in bench.series
     ]
     with contextlib.suppress(PredictionError):
-        if by_rests:
-            asked = _held(bench, found.predictions, turning, masks) > CLEARLY
-        else:
-            take(sharp)
-            asked = _matters(bench, before, bench.predict(given), turning)
-            take(signs)
+        take(sharp)
+        asked = _matters(bench, before, bench.predict(given), turning)
+        take(signs)
+        if carried_on is not None:
+            asked = asked and _held(bench, found.predictions, turning) > CLEARLY
         if asked:
             for series, rows in zip(bench.series, turning, strict=True):
                 # Of a record that hardly turns, what it has is better than nothing.
                 if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
                     series.train, series.hold = series.train & rows, series.hold & rows
-            # Both are fitted to the same samples.
-            smooth = carried_on(found)
-            held = _held(bench, smooth.predictions, turning, masks) if by_rests else 0.0
+            # Both are carried on with the same samples.
+            smooth = found if carried_on is None else carried_on(found)
             take(sharp)
-            sharper = carried_on(anew())
-            turned = _likelier(bench, smooth.predictions, sharper.predictions)
-            if turned > CLEARLY or min(turned + CLEARLY, held - CLEARLY) > 0.0:
+            sharper = anew() if carried_on is None else carried_on(anew())
+            if _likelier(bench, smooth.predictions, sharper.predictions):
                 return sharper
     take(signs)
     for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
@@ -125,11 +118,11 @@ def _matters(bench: Bench, before: Sequence[Array], now: Sequence[Array], turnin
     return seen > CLEARLY
 
 
-def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> float:
-    """Log-likelihood by which the sharper sign explains the motor's torque better, where that counts."""
+def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> bool:
+    """Whether the sharper sign explains the motor's torque clearly better, where that counts."""
     better = 0.0
     for series, before, now in zip(
-        bench.series, bench.residuals(smooth, drift=True), bench.residuals(sharp, drift=True), strict=True
+        bench.series, bench.residuals(smooth), bench.residuals(sharp), strict=True
     ):
         rows = series.train
         if series.channel != "motor_torque" or not len(now) or not rows.any():
@@ -137,25 +130,18 @@ def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> 
         before, now = before[rows], now[rows]
         independent = correlation(now, series.block[rows]) * max(float(np.mean(now**2)), series.noise**2)
         better += 0.5 * (float(np.sum(before**2)) - float(np.sum(now**2))) / independent
-    return better
+    return better > CLEARLY
 
 
-def _held(
-    bench: Bench,
-    smooth: Sequence[Array],
-    turning: Sequence[Mask],
-    masks: Sequence[tuple[Mask, Mask, float]],
-) -> float:
+def _held(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> float:
     """Log-likelihood by which the motor's torque is missed more at rest than while the shaft turns.
 
     Of two variances against one (Gaussian likelihood ratio), for as many independent samples as there are at
     rest. What is missing while the shaft turns is missing at rest as well, and says nothing of it.
     """
     better = 0.0
-    for series, left, rows, (train, _, _) in zip(
-        bench.series, bench.residuals(smooth, drift=True), turning, masks, strict=True
-    ):
-        turned, rest = train & rows, train & ~rows
+    for series, left, rows in zip(bench.series, bench.residuals(smooth), turning, strict=True):
+        turned, rest = series.train & rows, series.train & ~rows
         if series.channel != "motor_torque" or not len(left) or not (turned.any() and rest.any()):
             continue
         usual = max(float(np.mean(left[turned] ** 2)), series.noise**2)

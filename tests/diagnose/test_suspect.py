@@ -62,7 +62,7 @@ def test_this_drive_with_other_numbers_or_an_effect_is_not_suspected(tmp_path, r
         (scaled(torque=-100.0), "side", ["-100 times", "other side of the gear"]),
         (scaled(torque=-0.01), "side", ["-0.01 times", "other side of the gear"]),
         (scaled(torque=180 / np.pi), "unit", ["57.3 times", "degrees"]),
-        (scaled(motor=1 / (2 * np.pi)), "unit", ["6.29 times", "acceleration", "revolutions"]),
+        (scaled(motor=1 / (2 * np.pi)), "unit", ["6.3 times", "acceleration", "revolutions"]),
         (scaled(motor=-1.0), "sign", ["-1 times", "sign reversed"]),
         (scaled(inertia=12 * TOTAL), "ratio", ["times", "of another drive"]),
     ],
