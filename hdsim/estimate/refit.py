@@ -110,7 +110,6 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         return _roughly(bench, state, freedoms)[1]
 
     found = hear_standstill(bench, state, before, found, anew)
-    before = bench.predict(state)
     hear_motion(bench, (state, found.state), found.predictions)
     hear_flanks(bench, found.state)
     # Weights follow the residual: what a fit explained no longer counts as noise. A fit under weights that
@@ -179,9 +178,7 @@ def _at_its_end(bench: Bench, found: Fit) -> Fit:
     """A fit carried on under weights that follow what it leaves, until they stay."""
     for _ in range(WEIGHINGS):
         found = together(bench, found, rough=True)
-        before = [series.sigma for series in bench.series]
-        bench.weigh(bench.residuals(found.predictions))
-        if max(old / series.sigma for old, series in zip(before, bench.series, strict=True)) < ALIKE:
+        if _weights_risen(bench, found).max() < ALIKE:
             break
     return found
 
@@ -298,12 +295,16 @@ def reweigh(bench: Bench, found: Fit) -> float:
     Returns:
         Largest factor by which a training series' weight has risen.
     """
-    old = np.array([series.sigma for series in bench.series])
-    bench.weigh(bench.residuals(found.predictions))
-    new = np.array([series.sigma for series in bench.series])
-    change = (old / new)[bench.stacked_series()][:, None]
+    change = _weights_risen(bench, found)[bench.stacked_series()][:, None]
     if found.columns.size:
         found.columns *= change
     if found.beside is not None:
         found.beside = found.beside[0] * change, found.beside[1]
     return float(np.max(change, initial=1.0))
+
+
+def _weights_risen(bench: Bench, found: Fit) -> Array:
+    """Set the weights from what a fit leaves; factor by which each series' has risen, shape (series,)."""
+    old = np.array([series.sigma for series in bench.series])
+    bench.weigh(bench.residuals(found.predictions))
+    return np.asarray(old / np.array([series.sigma for series in bench.series]))

@@ -25,6 +25,7 @@ from hdsim.estimate.covariance import correlation
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import FEWEST_SAMPLES, Array, Mask
 from hdsim.estimate.state import State
+from hdsim.log.outliers import runs_of
 
 if TYPE_CHECKING:
     from hdsim.estimate.fit import Fit
@@ -80,6 +81,9 @@ def hear_standstill(
         for predictor, speed in zip(bench.predictors, smoothing, strict=True):
             predictor.smoothing = speed
 
+    def end_of(fit: Fit) -> Fit:
+        return fit if carried_on is None else carried_on(fit)
+
     turning = [
         ~at_rest(bench.predictors[s.record])
         if s.channel == "motor_torque"
@@ -87,20 +91,21 @@ def hear_standstill(
         for s in bench.series
     ]
     with contextlib.suppress(PredictionError):
-        take(sharp)
-        asked = _matters(bench, before, bench.predict(given), turning)
-        take(signs)
-        if carried_on is not None:
-            asked = asked and _held(bench, found.predictions, turning) > CLEARLY
+        # A first look needs no reason; what is asked of the found fit costs no prediction.
+        asked = carried_on is None or _held(bench, found.predictions, turning)
+        if asked:
+            take(sharp)
+            asked = _matters(bench, before, bench.predict(given), turning)
+            take(signs)
         if asked:
             for series, rows in zip(bench.series, turning, strict=True):
                 # Of a record that hardly turns, what it has is better than nothing.
                 if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
                     series.train, series.hold = series.train & rows, series.hold & rows
             # Both are carried on with the same samples.
-            smooth = found if carried_on is None else carried_on(found)
+            smooth = end_of(found)
             take(sharp)
-            sharper = anew() if carried_on is None else carried_on(anew())
+            sharper = end_of(anew())
             if _likelier(bench, smooth.predictions, sharper.predictions):
                 return sharper
     take(signs)
@@ -133,11 +138,11 @@ def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> 
     return better > CLEARLY
 
 
-def _held(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> float:
-    """Log-likelihood by which the motor's torque is missed more at rest than while the shaft turns.
+def _held(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> bool:
+    """Whether the motor's torque is clearly missed more at rest than while the shaft turns.
 
-    Of two variances against one (Gaussian likelihood ratio), for as many independent samples as there are at
-    rest. What is missing while the shaft turns is missing at rest as well, and says nothing of it.
+    Log-likelihood of two variances against one (Gaussian likelihood ratio), for as many independent samples
+    as there are at rest. What is missing while the shaft turns is missing at rest as well, and says nothing.
     """
     better = 0.0
     for series, left, rows in zip(bench.series, bench.residuals(smooth), turning, strict=True):
@@ -149,7 +154,7 @@ def _held(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> flo
         independent = rest.sum() / correlation(left[rest], series.block[rest])
         if more > 1.0:
             better += 0.5 * independent * (more - 1.0 - math.log(more))
-    return better
+    return better > CLEARLY
 
 
 def resolution(noise: float) -> float:
@@ -170,12 +175,6 @@ def at_rest(predictor: Predictor) -> Mask:
     return standing(speed, smoothing, predictor.motor_angle, SEEN * predictor.angle_noise)
 
 
-def runs(rows: Mask) -> list[tuple[int, int]]:
-    """First sample of each run of true ones, and the one behind it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def standing(speed: Array, smoothing: float, angle: Array | None = None, least_rad: float = 0.0) -> Mask:
     """Samples at which the shaft may rest or reverse, and those next to them, shape (n,).
 
@@ -194,7 +193,7 @@ def standing(speed: Array, smoothing: float, angle: Array | None = None, least_r
     slow[1:] |= turned
     slow[:-1] |= turned
     if angle is not None:
-        for first, end in runs(~slow):
+        for first, end in runs_of(~slow):
             # From the slow sample before to the one behind.
             if abs(angle[min(end, len(angle) - 1)] - angle[max(first - 1, 0)]) < least_rad:
                 slow[first:end] = True

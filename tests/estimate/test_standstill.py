@@ -101,7 +101,7 @@ def test_each_sign_is_judged_by_a_fit_at_its_end(smooth, sharp, held_nm, sticks)
         predictors=[predictor],
         series=[series],
         predict=lambda _: [np.tanh(speed / predictor.smoothing)],
-        residuals=lambda predictions, **_: [noise - predictions[0]],
+        residuals=lambda predictions: [noise - predictions[0]],
     )
     fits = {
         (sign, end): SimpleNamespace(predictions=[left * wave + held])
