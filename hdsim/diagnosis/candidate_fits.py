@@ -201,7 +201,7 @@ def full_fits(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
 
 
 def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> list[Fit]:
-    """An effect's fits from where its cost may have its next minima, carried on where they leave less.
+    """An effect's fits from where its cost may have its next minima, and on from one that leaves less.
 
     Args:
         bench: the measured series.
@@ -209,8 +209,31 @@ def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> l
         found: the fit.
         enough: power of what another may leave after the first time to be carried on further.
     """
-    added = found.state.added[-1]
-    others = [
+    begun = [found.state.added[-1]]
+    ends: list[Fit] = []
+    while True:
+        best = min([found, *ends], key=lambda each: bench.power(each.predictions))
+        others = [one for one in _at_next_minima(best.state.added[-1]) if not any(map(one.beside, begun))]
+        if not others:
+            return ends
+        begun += others
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            there = point_at(bench, base, best.theta[: len(base.frees)])
+            for other in others:
+                for free in fits_from(bench, base, there, other):
+                    ends += _to_its_end(bench, base, free, enough)
+                # The other numbers are far from what they are there: free at once, the shape may make up for
+                # them and leave the minimum before the fit has come near it.
+                for held in fits_from(bench, base, there, other.held()):
+                    *before, last = held.state.added
+                    freed = replace(other, coefficients=last.coefficients)
+                    begin = replace(held, state=replace(held.state, added=(*before, freed)))
+                    ends += _to_its_end(bench, base, begin, enough)
+
+
+def _at_next_minima(added: Added) -> list[Added]:
+    """An effect, of strength 1, where its cost may have its next minima."""
+    return [
         replace(
             added,
             coefficients=(1.0,) * len(added.coefficients),
@@ -219,13 +242,6 @@ def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> l
         for k, shape in enumerate(added.fitting.shapes)
         for v in shape.next_minima(added.shapes[k])
     ]
-    several: list[Fit] = []
-    if others:
-        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            there = point_at(bench, base, found.theta[: len(base.frees)])
-            for other in others:
-                several += fits_from(bench, base, there, other)
-    return [end for each in several for end in _to_its_end(bench, base, each, enough)]
 
 
 def _to_its_end(bench: Bench, base: Fit, found: Fit, enough: float) -> list[Fit]:

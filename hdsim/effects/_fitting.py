@@ -96,6 +96,10 @@ class Shape:
             return []
         return [v for v in (value / self.apart, value * self.apart) if self.least <= v <= self.most]
 
+    def beside(self, value: float, other: float) -> bool:
+        """Whether two values are nearer to one another than minima of the cost may be."""
+        return self.apart == 1.0 or abs(math.log(value / other)) < 0.5 * math.log(self.apart)
+
     @property
     def distance(self) -> float:
         """Of two starts of a linear shape: the unit in which a fit moves it."""

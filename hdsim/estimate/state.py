@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from hdsim.effects._fitting import Fitting
 from hdsim.effects.table import Table
 from hdsim.estimate.predict import LEAD_IN_S, Candidate, PredictionError
 from hdsim.estimate.records import Array
-from hdsim.nested import merge
+from hdsim.nested import copied, merge, put
 
 if TYPE_CHECKING:
     from hdsim.scenario import Scenario
@@ -67,6 +67,18 @@ class Added:
     def freedom(self) -> int:
         """Free numbers; orders that are read from the data are, too."""
         return len(self.coefficients) + len(self.shapes) + len(self.orders)
+
+    def held(self) -> Added:
+        """The effect with its shapes as settings, which no fit moves."""
+        settings: dict[str, Any] = copied(self.fitting.settings)
+        for shape, value in zip(self.fitting.shapes, self.shapes, strict=True):
+            put(settings, shape.path, value)
+        return replace(self, fitting=replace(self.fitting, shapes=(), settings=settings), shapes=())
+
+    def beside(self, other: Added) -> bool:
+        """Whether no shape is so far from the same effect's elsewhere that a minimum may lie between."""
+        pairs = zip(self.fitting.shapes, self.shapes, other.shapes, strict=True)
+        return all(shape.beside(one, another) for shape, one, another in pairs)
 
     def limits(self, path: str) -> tuple[float, float]:
         """Least and largest value that a field of the effect allows."""
