@@ -177,6 +177,14 @@ class Sensors(Effect):
             needs=("output_angle",),
             lives_in=("wave_generator_angle",),
         ),
+        # The motor's own reading is prescribed: what is wrong with it is found in what follows from it.
+        Fitting(
+            (Harmonic("motor_angle.eccentricity_arcmin", "motor_angle.eccentricity_phase_deg", 2.0),),
+            label="motor encoder eccentricity",
+            lives_in=("wave_generator_angle",),
+            needs=("output_angle",),
+            turns=1.0,
+        ),
         Fitting(
             (Amplitude({"output_angle.delay_s": 5e-4}),),
             label="output encoder delay",

@@ -43,7 +43,8 @@ class Unbalance(Effect):
             "output_eccentricity": "kinematic: shows in the output angle without torque",
             "wave_generator_eccentricity": "kinematic: its torque grows with the load, an unbalance's does "
             "not",
-            "sensors": "an eccentric encoder leaves no torque",
+            "sensors": "an eccentric encoder leaves no torque but the inertia's, which grows with the "
+            "square of the speed",
         },
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (

@@ -173,7 +173,7 @@ class Bench:
         ]
 
     def reread(self, predictions: Sequence[Array], before: State, now: State) -> list[Array]:
-        """Predictions of a state that differs from ``before`` in the readings' gain and delays only."""
+        """Predictions of a state that differs from ``before`` in the readings' gains and delays only."""
         return [
             now.reading(s.channel, self.time_of(s), values, before) if len(values) else values
             for s, values in zip(self.series, predictions, strict=True)

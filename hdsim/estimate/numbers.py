@@ -14,9 +14,11 @@ from hdsim.number import FIXED, Number, declared, limits
 from hdsim.parts import Effect
 from hdsim.scenario.fields import split_unit
 
-#: Prior standard deviations of a torque's sensitivity (its logarithm) and of its delay beside the motion (in
-#: samples).
-GAIN_PRIOR, DELAY_PRIOR = 0.15, 1.0
+#: Prior standard deviations of the torques' sensitivities (their logarithms): a torque constant is printed at
+#: +-10 % and falls with saturation and heat, strain gauges on a joint are calibrated to a few percent.
+GAIN_PRIORS = {"motor_torque": 0.15, "output_torque": 0.03}
+#: The same of a torque's delay beside the motion, in samples.
+DELAY_PRIOR = 1.0
 #: Factor from 1 beyond which a fitted sensitivity is suspect.
 FAR_GAIN = 2.0
 #: Farthest that a logarithm goes from where its prior has its centre.
@@ -123,8 +125,8 @@ def base_freedoms(
         state: the model.
         channels: the predicted channels; the torque's sensitivity is free when the motor's torque is one.
         load_known: the output's torque is measured and given, so nothing of the load is free.
-        locked: the output does not move: then only a second torque tells the sensitivity of the motor's from
-            the drive's own stiffness and friction.
+        locked: nothing moves but the drive's own spring: then only a second torque tells the sensitivity of
+            one from stiffness and friction.
         apart: paths of numbers of a group that move by themselves, such as the drive's first stiffness.
     """
     sections: dict[str, Any] = {"drive": state.drive, "load": state.load}
@@ -154,10 +156,14 @@ def base_freedoms(
                     least=max(first.least, one.least * ratio),
                     most=min(first.most, one.most * ratio),
                 )
-    if "motor_torque" in channels and ("output_torque" in channels or not locked):
-        name = "motor_torque_gain"
-        found[name, name] = Free(name, (), GAIN_PRIOR, state.gain, gain_of="motor_torque", far=FAR_GAIN)
-    return list(found.values())
+    torques = predicted_torques(channels, load_known=load_known)
+    if locked and len(torques) < 2:
+        torques = ()
+    gains = [
+        Free(f"{c}_gain", (), GAIN_PRIORS[c], state.gains.get(c, 1.0), gain_of=c, far=FAR_GAIN)
+        for c in torques
+    ]
+    return [*found.values(), *gains]
 
 
 def delay_freedoms(
@@ -171,12 +177,16 @@ def delay_freedoms(
         period_s: of the samples.
         load_known: the output's torque is given, so only the motor's can be late.
     """
-    torques = ("motor_torque",) if load_known else ("motor_torque", "output_torque")
     return [
         Free(f"{c}_delay_s", (), DELAY_PRIOR, state.delays.get(c, 0.0), "s", period_s, delay_of=c)
-        for c in torques
-        if c in channels
+        for c in predicted_torques(channels, load_known=load_known)
     ]
+
+
+def predicted_torques(channels: Sequence[str], *, load_known: bool = False) -> tuple[str, ...]:
+    """Torques among the predicted channels; the output's is none where it is given as the load."""
+    torques = ("motor_torque",) if load_known else ("motor_torque", "output_torque")
+    return tuple(c for c in torques if c in channels)
 
 
 def undeclared(state: State, path: str, prior: float) -> Free | None:
@@ -226,14 +236,14 @@ def _inverse(model: BaseModel, name: str) -> bool:
 def scaled(state: State, frees: Sequence[Free], theta: Sequence[float]) -> State:
     """``state`` with every freedom's numbers multiplied by exp(theta), delays moved by their steps."""
     sections: dict[str, Any] = {"drive": state.drive, "load": state.load}
-    effects, gain, delays = dict(state.effects), state.gain, dict(state.delays)
+    effects, gains, delays = dict(state.effects), dict(state.gains), dict(state.delays)
     for free, t in zip(frees, theta, strict=True):
         if free.delay_of:
             delays[free.delay_of] = delays.get(free.delay_of, 0.0) + free.step * float(t)
             continue
         factor = math.exp(float(t))
         if free.gain_of:
-            gain *= factor
+            gains[free.gain_of] = gains.get(free.gain_of, 1.0) * factor
         for path in free.paths:
             section, _, rest = path.partition(".")
             if section in sections:
@@ -242,7 +252,7 @@ def scaled(state: State, frees: Sequence[Free], theta: Sequence[float]) -> State
                 name, _, field_name = rest.partition(".")
                 effects[name] = _multiplied(effects[name], field_name, factor)
     return replace(
-        state, drive=sections["drive"], load=sections["load"], effects=effects, gain=gain, delays=delays
+        state, drive=sections["drive"], load=sections["load"], effects=effects, gains=gains, delays=delays
     )
 
 

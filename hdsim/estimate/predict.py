@@ -27,6 +27,7 @@ from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
 from hdsim.estimate.thin import Means
+from hdsim.estimate.true_motion import errors_of, true_motion
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
@@ -242,7 +243,7 @@ class Predictor:
             parts.append(LeadInDamper(candidate.drive, inertia, LEAD_IN_S, self.ratio))
         if self._zero:
             parts.append(Zero(self._zero))
-        motions: dict[str, Any] = {"motor": self.motion}
+        motions: dict[str, Any] = {"motor": self._motion(candidate)}
         if self.plan.locked == "output":
             motions["output"] = SignalData(Hold().move())
         elif self.plan.locked == "motor":
@@ -285,6 +286,14 @@ class Predictor:
                 own = own - self._slow.of(own) if np.any(own) else own
                 found["output_torque"] = self.slow_torque + own
         return found
+
+    def _motion(self, candidate: Candidate) -> SignalData:
+        """The motor's motion, without the error that the candidate knows of the encoder it was read from."""
+        errors = errors_of(candidate.effects, self.plan.motion)
+        if self.plan.locked or not errors:
+            return self.motion
+        breaks, angle = true_motion(self._breaks, self._coefficients / self._factor, errors)
+        return signal(breaks, self._factor * angle, LEAD_IN_S)
 
 
 class PredictionError(ArithmeticError):

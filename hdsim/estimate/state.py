@@ -112,7 +112,7 @@ class State:
         load: the load.
         effects: settings of the effects of the base, by name.
         added: effects that the diagnosis has added.
-        gain: sensitivity of the motor torque's reading.
+        gains: sensitivities of the torques' readings where they are not 1, by channel.
         seed: seed of the model.
         delays: age of the torques' readings beside that of the motion's, s, by channel.
     """
@@ -121,7 +121,7 @@ class State:
     load: Any
     effects: dict[str, Any]
     added: tuple[Added, ...] = ()
-    gain: float = 1.0
+    gains: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     delays: Mapping[str, float] = field(default_factory=dict)
 
@@ -137,16 +137,16 @@ class State:
             channel: its name.
             time: shape (n,), s.
             values: the prediction, shape (n,); or the reading under the state ``before``.
-            before: a state that differs in gain and delays only.
+            before: a state that differs in gains and delays only.
         """
-        delay, gain = self.delays.get(channel, 0.0), self.gain
+        delay, gain = self.delays.get(channel, 0.0), self.gains.get(channel, 1.0)
         if before is not None:
-            delay, gain = delay - before.delays.get(channel, 0.0), gain / before.gain
+            delay, gain = delay - before.delays.get(channel, 0.0), gain / before.gains.get(channel, 1.0)
         if delay:
             from scipy.interpolate import CubicSpline
 
             values = CubicSpline(time, values)(np.clip(time - delay, time[0], time[-1]))
-        return gain * values if channel == "motor_torque" else values
+        return gain * values
 
     def candidate(self) -> Candidate:
         """The model to predict with.
@@ -184,7 +184,7 @@ class State:
 
 def state_of(scenario: Scenario) -> State:
     """The scenario's model before anything is fitted."""
-    return State(scenario.drive, scenario.load, scenario.effects.active(), (), 1.0, scenario.run.seed)
+    return State(scenario.drive, scenario.load, scenario.effects.active(), seed=scenario.run.seed)
 
 
 def number_at(state: State, path: str) -> float | None:

@@ -57,8 +57,9 @@ def scenario_text(
     for added in state.added:
         known = effects.setdefault(added.effect, _lists(start, added.effect))
         merge(known, _all_rounded(added.settings()))
-    if abs(state.gain - 1.0) > 1e-9:
-        put(effects, "sensors.motor_torque.gain_error", _rounded(state.gain - 1.0))
+    for channel, gain in state.gains.items():
+        if abs(gain - 1.0) > 1e-9:
+            put(effects, f"sensors.{channel}.gain_error", _rounded(gain - 1.0))
     if effects:
         merge(data.setdefault("effects", {}), effects)
     return to_yaml(data)

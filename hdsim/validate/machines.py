@@ -91,7 +91,7 @@ def lara8(data: Path | None) -> Iterator[Row]:
         found, record = _lara8(path)
         fitted = found.fit.state.drive.friction
         at_motor = fitted.coulomb_nm + fitted.viscous_nm_s_per_rad * _RATIO * _SPEED
-        at_motor *= found.fit.state.gain
+        at_motor *= found.fit.state.gains.get("motor_torque", 1.0)
         friction = _RATIO * (at_motor + found.readings[0].offsets["motor_torque"])
         weight = _value(found, "load.gravity.mass_kg")[0] * 0.6 * 9.80665
         regressed = _weight_by_regression(record)
@@ -185,7 +185,7 @@ def _kinova(path: Path, joint: int) -> tuple[float, float, float]:
     faster = float(np.nanpercentile(np.abs(speed), 99)) / 2.0
     friction = found.fit.state.drive.friction
     # As the motor's current reads it: the fit leaves the reading's gain free, the regression does not.
-    read = 100.0 * found.fit.state.gain
+    read = 100.0 * found.fit.state.gains.get("motor_torque", 1.0)
     ours = read * (friction.coulomb_nm + friction.viscous_nm_s_per_rad * 100.0 * faster)
     moving = np.abs(speed) > 0.02
     columns = np.column_stack([np.sign(speed), speed, np.gradient(speed, measured.time), np.ones(len(speed))])

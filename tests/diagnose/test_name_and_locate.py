@@ -11,7 +11,7 @@ from hdsim.diagnosis.verdict import Verdict
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.numbers import GAIN_PRIOR
+from hdsim.estimate.numbers import GAIN_PRIORS
 from hdsim.estimate.orders import order_lines
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.prove import borne_out
@@ -182,7 +182,7 @@ def test_missing_friction_is_named_where_the_base_has_none(tmp_path):
         low, high = numbers[field].interval
         assert low <= truth <= high
         # Nothing but the sensor ties torques to an absolute scale, and its constant is known to 15 %.
-        assert high - low < 4.5 * GAIN_PRIOR * truth
+        assert high - low < 4.5 * GAIN_PRIORS["motor_torque"] * truth
 
 
 def test_suspect_data_stop_a_diagnosis_with_the_reason(tmp_path):

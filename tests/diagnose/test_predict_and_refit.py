@@ -100,7 +100,7 @@ def test_a_wrong_inertia_and_friction_are_found_with_honest_intervals(tmp_path):
     by_name = {i.name: i for i in found.intervals}
     coulomb = by_name["drive.friction.coulomb_nm"]
     viscous = by_name["drive.friction.viscous_nm_s_per_rad"]
-    gain = found.fit.state.gain
+    gain = found.fit.state.gains["motor_torque"]
     # Nothing but the sensor ties torques to an absolute scale: products with its gain are what is measured.
     assert gain * coulomb.value == pytest.approx(0.04, rel=0.02)
     assert gain * viscous.value == pytest.approx(3.5e-4, rel=0.02)
@@ -206,6 +206,9 @@ def test_a_locked_drive_tells_its_torque_constant_only_beside_a_second_torque(tm
     assert "motor_torque_gain" in free("motor_torque", locked=False)
     assert "motor_torque_gain" in free("motor_torque", "output_torque", locked=True)
     assert "motor_torque_gain" not in free("motor_torque", locked=True)
+    assert "output_torque_gain" in free("motor_torque", "output_torque", locked=True)
+    assert "output_torque_gain" not in free("output_torque", locked=True)
+    assert "output_torque_gain" in free("output_torque", locked=False)
 
 
 def test_a_harmonics_phase_is_as_sure_as_its_ellipse_is_narrow():
