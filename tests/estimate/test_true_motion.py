@@ -1,4 +1,4 @@
-"""A known error of the encoder whose reading is prescribed: against root finding, and against a run's truth."""
+"""A known error of the encoder whose reading is prescribed: against root finding and a run's truth."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,11 @@ def scenario(effects: dict | None = None) -> Scenario:
 
 
 @given(
-    st.floats(0.0, 0.15), st.floats(-np.pi, np.pi), st.floats(1.0, 300.0), st.integers(2, 8), st.floats(0, 0.01)
+    amplitude=st.floats(0.0, 0.15),
+    phase=st.floats(-np.pi, np.pi),
+    speed=st.floats(1.0, 300.0),
+    order=st.integers(2, 8),
+    ripple=st.floats(0, 0.01),
 )
 def test_the_true_angle_is_the_root_of_what_was_read(amplitude, phase, speed, order, ripple):
     time = np.linspace(0.0, 0.2, 21)
@@ -94,8 +98,8 @@ def test_an_eccentric_motor_encoder_is_named_and_found():
     rng = np.random.default_rng(4)
     run = hdsim.simulate(scenario({"sensors": ECCENTRIC}))
     noise = {"motor_angle": 2e-5, "output_angle": 5e-6, "motor_torque": 1e-3}
-    channels = {"motor_angle": run["measured_motor_angle"], **{c: run[c] for c in noise if c != "motor_angle"}}
-    channels = {c: v + noise[c] * rng.standard_normal(len(v)) for c, v in channels.items()}
+    read = {c: run["measured_motor_angle" if c == "motor_angle" else c] for c in noise}
+    channels = {c: v + noise[c] * rng.standard_normal(len(v)) for c, v in read.items()}
     verdict = hdsim.diagnose([Record("r", run.time, channels)], scenario()).verdict
     assert verdict.verdict == "effect"
     (found,) = verdict.effects

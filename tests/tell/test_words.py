@@ -43,6 +43,8 @@ EXPECTED = {
     "output_eccentricity.phase_deg": "deg",
     "position_dependent_friction.components.amplitude_nm": "N m",
     "position_dependent_friction.components.phase_deg": "deg",
+    "sensors.motor_angle.eccentricity_arcmin": "arcmin",
+    "sensors.motor_angle.eccentricity_phase_deg": "deg",
     "sensors.output_angle.delay_s": "s",
     "sensors.output_angle.eccentricity_arcmin": "arcmin",
     "sensors.output_angle.eccentricity_phase_deg": "deg",
@@ -86,6 +88,7 @@ OF_THE_MODEL = {
     "drive.friction.viscous_nm_s_per_rad": "N m s/rad",
     "drive.friction.load_coefficient": "",
     "motor_torque_gain": "",
+    "output_torque_gain": "",
     "motor_torque_delay_s": "s",
     "output_torque_delay_s": "s",
 }
