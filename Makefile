@@ -7,12 +7,13 @@ STAMP  := $(VENV)/installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-fast check checked compiled setup lock schema picture site blind pythons clean
+.PHONY: help run test test-fast test-studies check checked compiled setup lock schema picture site blind pythons clean
 
 help:
 	@echo "make run        simulate the seed drive; the log and the picture go to logs/"
-	@echo "make test       lint, types and all tests"
-	@echo "make test-fast  the same without the slow studies"
+	@echo "make test       lint, types and the tests"
+	@echo "make test-fast  the same without the slow ones"
+	@echo "make test-studies  slow tests on further cases: what make test has no time for"
 	@echo "make setup      only install what is needed into $(VENV)"
 	@echo "make lock       resolve the development set anew (needs uv)"
 	@echo "make schema     write the JSON schemas of what people write anew"
@@ -48,10 +49,13 @@ compiled: $(STAMP)
 	$(BIN)/python tests/compiled.py
 
 test: checked
-	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10 -m "not study"
 
 test-fast: checked
-	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow"
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow and not study"
+
+test-studies: checked
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10 -m study
 
 lock:
 	uv pip compile --quiet --universal --python-version 3.11 --group dev --all-extras \

@@ -8,6 +8,7 @@ from running import Task, attempt
 
 
 @pytest.mark.slow
+@pytest.mark.study
 def test_two_formulas_of_one_effect_are_one_name() -> None:
     """A compliance by another law: play and compliance each explain 98 %, and neither seemed needed."""
     line = attempt(Task("numpy", 8, 13))

@@ -87,7 +87,7 @@ def test_setups_stay_within_the_stated_ranges():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", QUICK)
+@pytest.mark.parametrize("number", [QUICK[0], *(pytest.param(n, marks=pytest.mark.study) for n in QUICK[1:])])
 def test_a_case_follows_from_its_key(number):
     first = drawn_once(number)
     task = task_of(first.key)

@@ -174,7 +174,7 @@ def check_case(case: Case, family: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [1, 3, 7])
+@pytest.mark.parametrize("number", [1, 3, pytest.param(7, marks=pytest.mark.study)])
 def test_a_mujoco_case_follows_from_number_and_seed(mujoco_family, number):
     first, again = mujoco_family.draw(number, 0), mujoco_family.draw(number, 0)
     check_case(first, "mujoco")
@@ -193,7 +193,7 @@ def test_a_toothed_case_follows_from_number_and_seed(number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [1, 4])
+@pytest.mark.parametrize("number", [pytest.param(1, marks=pytest.mark.study), 4])
 def test_a_case_with_a_base_that_has_teeth_follows_from_number_and_seed(number):
     first, again = family_teeth.draw(number, 0), family_teeth.draw(number, 0)
     check_case(first, "teeth")

@@ -62,7 +62,7 @@ def fitted(effect: str) -> tuple[Bench, Fit, float]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", ["output_backlash", "flank_wear"])
+@pytest.mark.parametrize("effect", [pytest.param("output_backlash", marks=pytest.mark.study), "flank_wear"])
 def test_its_interval_holds_the_gap_of_other_flanks_that_wore_otherwise(effect: str) -> None:
     bench, found, true = fitted(effect)
     (added,) = found.state.added

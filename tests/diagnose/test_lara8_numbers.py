@@ -73,10 +73,11 @@ def test_friction_that_is_far_off_comes_back_in_the_refit(tmp_path, stiffness, t
 
 #: Of the author's law: asked are 0.15. At the lowest speed the base's own stiffness ends 16 % above it.
 NEAR, NEAR_AT_LOW_SPEED = 0.15, 0.2
+STUDY = pytest.mark.study
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("stiffness", [pytest.param(0.5, marks=STUDY), 1.0, pytest.param(2.0, marks=STUDY)])
 def test_friction_at_three_speeds_is_its_authors(tmp_path, stiffness):
     found = diagnose([lara.record()], lara.base(tmp_path, stiffness, False, True), zeros="trusted").verdict
     effect = next(effect for effect in found.effects if effect.name == "input_coulomb_viscous")

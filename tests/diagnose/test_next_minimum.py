@@ -71,7 +71,16 @@ def on_screen(bench: Bench, base: Fit, left: Residual, scale: float) -> Screened
 @pytest.mark.slow
 # Without the next minima, or not carried on from there, the torques are 1.3 of 3, 1.0 of 2 N m; without the
 # minima next to a better one, or with the shape free from the first step on, 1.3 of 2 and 1.0 of 2.5 N m.
-@pytest.mark.parametrize(("slip_nm", "scale"), [(0.5, 0.5), (1.0, 1.0), (2.0, 1.0), (2.5, 1.5), (3.0, 1.0)])
+@pytest.mark.parametrize(
+    ("slip_nm", "scale"),
+    [
+        (0.5, 0.5),
+        pytest.param(1.0, 1.0, marks=pytest.mark.study),
+        (2.0, 1.0),
+        (2.5, 1.5),
+        pytest.param(3.0, 1.0, marks=pytest.mark.study),
+    ],
+)
 def test_a_fit_that_begins_at_the_next_minimum_ends_at_the_true_slip_torque(
     slip_nm: float, scale: float
 ) -> None:

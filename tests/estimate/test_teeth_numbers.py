@@ -52,6 +52,8 @@ NUMBERS: dict[str, tuple[float, dict[str, Any]]] = {
 #: only flanks that are known tell.
 HIDDEN = (f"{MESH}.contact.materials.flexspline.hardness_pa", f"{MESH}.contact.contact_stiffness_n_per_m")
 UNTOLD = f"{MESH}.engagement.edge_teeth"
+#: Fits of these take longest.
+LONGEST = ("engagement.clearance_m", "gap_factor")
 
 
 def scenario(mesh: dict[str, Any]) -> Scenario:
@@ -123,7 +125,14 @@ def test_no_fit_moves_it_unasked_and_its_field_says_what_is_believed(path: str) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", [path for path in NUMBERS if path != UNTOLD])
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=pytest.mark.study) if path.endswith(LONGEST) else path
+        for path in NUMBERS
+        if path != UNTOLD
+    ],
+)
 def test_a_changed_one_is_found_again(path: str) -> None:
     factor, _ = NUMBERS[path]
     (found,) = alone(path).intervals

@@ -50,7 +50,7 @@ def test_recovering_a_sound_log_loses_nothing(log, recording, tmp_path):
 def test_a_flipped_byte_anywhere_is_noticed(log):
     size = log.stat().st_size
     rng = np.random.default_rng(5)
-    places = [*rng.integers(8, size - 8, 30).tolist(), *range(size - 40, size, 2)]
+    places = [*rng.integers(8, size - 8, 12).tolist(), *range(size - 40, size, 5)]
     for at in places:
         flip(log, at)
         with pytest.raises(InputError, match=r"hdsim recover|not an MCAP"):
