@@ -15,7 +15,6 @@ import numpy as np
 from hdsim.diagnosis.traces import designs
 from hdsim.estimate.asked import asked_beside
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit, at_present, fit, sharpened
 from hdsim.estimate.numbers import Free, scaled
 from hdsim.estimate.predict import PredictionError
@@ -79,7 +78,7 @@ def fits_from(bench: Bench, base: Fit, given: Point, added: Added) -> list[Fit]:
     moving[: len(base.frees)] = [not free.step for free in base.frees]
     both = np.hstack([given.columns * moving, columns])
     found, *_ = np.linalg.lstsq(both, given.left, rcond=1e-6)
-    return rough_fits(bench, base, given, added, columns, power_of_sample(bench, given.left - both @ found))
+    return rough_fits(bench, base, given, added, columns, bench.sample_power(given.left - both @ found))
 
 
 def rough_fits(
@@ -192,7 +191,7 @@ def full_fits(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
     state = replace(base.state, added=found.state.added)
     added = found.state.added[-1]
     evaluations = FULL + 4 * bool(added.shapes) + 2 * len(added.fitting.asks)
-    known = found.columns, power_of_sample(bench, bench.stacked(bench.residuals(found.predictions)))
+    known = found.columns, bench.sample_power(bench.stacked(bench.residuals(found.predictions)))
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         full = fit(bench, state, found.frees, prune=False, evaluations=evaluations, theta=theta, after=base,
                    known=known, rough=True)  # fmt: skip
@@ -262,8 +261,3 @@ def _to_its_end(bench: Bench, base: Fit, found: Fit, enough: float) -> list[Fit]
             break
         found = further[0]
     return ends
-
-
-def power_of_sample(bench: Bench, rest: Array) -> float:
-    """What one independent sample of a residual counts."""
-    return max(float(np.mean(rest**2)), 1e-30) * correlation(rest, bench.stacked_blocks())

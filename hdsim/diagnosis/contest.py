@@ -16,7 +16,6 @@ from hdsim.diagnosis.candidate_fits import (
     fits_from,
     full_fits,
     point_at,
-    power_of_sample,
     rough_fits,
 )
 from hdsim.diagnosis.screen import Residual
@@ -86,7 +85,7 @@ def contest(
             if columns is None:
                 continue
             rest = residual.values - residual.project(each.columns) @ np.array(each.added.coefficients)
-            keep(one.name, rough_fits(bench, base, here, each.added, columns, power_of_sample(bench, rest)))
+            keep(one.name, rough_fits(bench, base, here, each.added, columns, bench.sample_power(rest)))
     if not best:
         return []
     noise = sum(bench.noise_powers.values())
@@ -154,7 +153,7 @@ def against_priors(bench: Bench, results: Sequence[tuple[str, Fit, Array]]) -> l
     were given as: a fit that has to bend the base needs as much more of the data on its side.
     """
     best = min(results, key=lambda result: float(result[2].sum()))[1]
-    power = power_of_sample(bench, bench.stacked(bench.residuals(best.predictions)))
+    power = bench.sample_power(bench.stacked(bench.residuals(best.predictions)))
 
     def strain(found: Fit) -> float:
         return sum(

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdsim.diagnosis.candidate_fits import power_of_sample
 from hdsim.diagnosis.curve_kinds import Kind, sign_of, values_of
 from hdsim.diagnosis.penalised import UNSEEN, Penalised
 from hdsim.diagnosis.screen import Residual
@@ -135,7 +134,7 @@ def solved(
     moving = np.array([not free.step for free in fit.frees], dtype=float)
     own = np.hstack([fit.columns[:, : len(fit.frees)] * moving, bench.offset_columns()])
     # What the data hardly tell stays where priors have it.
-    strict = np.array([1.0 / free.prior for free in fit.frees]) * math.sqrt(power_of_sample(bench, rest))
+    strict = np.array([1.0 / free.prior for free in fit.frees]) * math.sqrt(bench.sample_power(rest))
     priors = np.hstack([np.diag(strict), np.zeros((len(theta), own.shape[1] - len(theta)))])
     centre = np.array([free.none for free in fit.frees]) - fit.theta
     for _ in range(2):

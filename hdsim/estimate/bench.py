@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hdsim.errors import InputError
+from hdsim.estimate.covariance import sample_power
 from hdsim.estimate.offsets import Zeros, offset_columns, offsets_of
 from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.estimate.records import Array
@@ -213,6 +214,10 @@ class Bench:
                 return None
 
         return in_order(one, states)
+
+    def sample_power(self, rest: Array) -> float:
+        """What one independent sample of a stacked residual, shape (rows,), counts."""
+        return sample_power(rest, self.stacked_blocks())
 
     def offsets(self, predictions: Sequence[Array], *, drift: bool = False) -> list[float]:
         """The sensors' zeros, SI units: what is measured less what is predicted, by ``offsets_of``."""

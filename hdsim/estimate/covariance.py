@@ -23,6 +23,11 @@ def correlation(rest: Array, blocks: NDArray[np.int64]) -> float:
     return float(np.clip(ratio, 1.0, counts[used].mean()))
 
 
+def sample_power(rest: Array, blocks: NDArray[np.int64]) -> float:
+    """What one independent sample of a residual counts: its power, times the samples that it stands for."""
+    return max(float(np.mean(rest**2)), 1e-30) * correlation(rest, blocks)
+
+
 def robust_covariance(
     columns: Array,
     rest: Array,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hdsim.estimate.covariance import correlation
+from hdsim.estimate.covariance import sample_power
 from hdsim.estimate.records import Array
 
 #: Ratio of posterior to prior spread above which the data are said not to determine a number.
@@ -59,7 +59,7 @@ def determined(
     # What one step of the fit takes away is no noise, however far off the start is.
     step, *_ = np.linalg.lstsq(columns * priors, rest, rcond=1e-6)
     rest = rest - columns * priors @ step
-    power = max(float(np.mean(rest**2)), 1e-30) * correlation(rest, blocks)
+    power = sample_power(rest, blocks)
     kept = list(range(candidates))
     others = list(range(candidates, columns.shape[1]))
     dropped: list[int] = []

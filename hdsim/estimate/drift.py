@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import correlation, robust_covariance
+from hdsim.estimate.covariance import robust_covariance
 from hdsim.estimate.fit import Fit, at_present
 from hdsim.estimate.flanks import widen_by_flanks
 from hdsim.estimate.offsets import drift_columns
@@ -64,7 +64,7 @@ def _stepped(
     # What the zeros bend no sample is worth less for.
     whole, *_ = np.linalg.lstsq(columns * both, rest, rcond=1e-6)
     apart = rest - columns * both @ whole
-    power = max(float(np.mean(apart**2)), 1e-30) * correlation(apart, bench.stacked_blocks())
+    power = bench.sample_power(apart)
     inner = np.linalg.inv(drifts.T @ drifts / power + np.diag(1.0 / spreads**2))
 
     def beside(rest: Array) -> Array:

@@ -12,7 +12,6 @@ from hdsim.errors import InputError
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import correlation
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.determine import UNDETERMINED
 from hdsim.estimate.drift import drifted
@@ -274,7 +273,7 @@ def _directions(bench: Bench, found: Fit) -> list[Direction]:
             beside = sensitivities(bench, unknown, unknown.start(), found.predictions)
         columns = np.hstack([columns, beside])
     rest = bench.stacked(bench.residuals(found.predictions))
-    power = max(float(np.mean(rest**2)), 1e-30) * correlation(rest, bench.stacked_blocks())
+    power = bench.sample_power(rest)
     priors = np.array([free.prior for free in frees])
     return directions(columns, priors, power, [free.name for free in frees])
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import correlation, robust_covariance
+from hdsim.estimate.covariance import robust_covariance, sample_power
 from hdsim.estimate.determine import determined
 from hdsim.estimate.minimise import EVALUATIONS, minimised
 from hdsim.estimate.numbers import REACH, Free, Interval, scaled
@@ -152,7 +152,7 @@ def fit(
         empty = np.zeros((len(start), 0))
         return Fit(state, [], x0, np.zeros((0, 0)), predictions, empty, undetermined, ties, beside)
     if math.isnan(power):
-        power = correlation(start, problem.blocks) * max(float(np.mean(start**2)), 1e-30)
+        power = sample_power(start, problem.blocks)
     near = None
     if known is not None:
         own = min(len(chosen), known[0].shape[1])

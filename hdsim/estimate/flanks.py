@@ -16,7 +16,6 @@ import numpy as np
 
 from hdsim.drive.parameters import ToothedMesh
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import correlation
 from hdsim.estimate.noise import usual_size
 from hdsim.estimate.numbers import Free, scaled, undeclared
 from hdsim.estimate.predict import PredictionError
@@ -148,7 +147,7 @@ def led_by(bench: Bench, found: Fit, columns: Array) -> Array:
     if found.beside is not None:
         own, priors = np.hstack([own, found.beside[0]]), np.concatenate([priors, found.beside[1]])
     rest = bench.stacked(bench.residuals(found.predictions))
-    power = max(float(np.mean(rest**2)), 1e-30) * correlation(rest, bench.stacked_blocks())
+    power = bench.sample_power(rest)
     information = own.T @ own / power + np.diag(1.0 / priors**2)
     moves = np.linalg.solve(information, own.T @ columns / power)
     return np.asarray(moves[: found.columns.shape[1]].T)

@@ -11,7 +11,7 @@ import numpy as np
 
 from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import correlation, robust_covariance
+from hdsim.estimate.covariance import robust_covariance
 from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled
 from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
 from hdsim.estimate.motion_noise import hear_motion
@@ -265,7 +265,7 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
 def _against(bench: Bench, found: Fit, like: Fit) -> float:
     """What data and priors have against a fit, in units of an independent sample of what ``like`` leaves."""
     rest = bench.stacked(bench.residuals(like.predictions))
-    power = max(correlation(rest, bench.stacked_blocks()) * float(np.mean(rest**2)), 1e-30)
+    power = bench.sample_power(rest)
     far = [(t - free.none) / free.prior for t, free in zip(found.theta, found.frees, strict=True)]
     return bench.power(found.predictions) / power + float(np.sum(np.square(far)))
 
