@@ -131,6 +131,8 @@ class Predictor:
         self._coefficients = self._coefficients.copy()
         self._coefficients[0] += angle
         self.motion = signal(self._breaks, self._coefficients, LEAD_IN_S)
+        #: The last motion without an encoder's errors, by these.
+        self._true: dict[tuple[tuple[float, float, float], ...], SignalData] = {}
         motion = self.motion.values(self.record.time + LEAD_IN_S)
         #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
         self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
@@ -292,8 +294,15 @@ class Predictor:
         errors = errors_of(candidate.effects, self.plan.motion)
         if self.plan.locked or not errors:
             return self.motion
-        breaks, angle = true_motion(self._breaks, self._coefficients / self._factor, errors)
-        return signal(breaks, self._factor * angle, LEAD_IN_S)
+        kept = self._true.get(errors)
+        if kept is None:
+            try:
+                breaks, angle = true_motion(self._breaks, self._coefficients / self._factor, errors)
+            except ValueError as error:
+                raise PredictionError(f"sensors.{self.plan.motion}: {error}") from None
+            kept = signal(breaks, self._factor * angle, LEAD_IN_S)
+            self._true = {errors: kept}  # a fit of something else asks for the same again
+        return kept
 
 
 class PredictionError(ArithmeticError):

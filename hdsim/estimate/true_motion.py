@@ -20,8 +20,10 @@ OWN = {"motor_angle": "wave_generator_turn", "output_angle": "output_turn"}
 #: Largest angle of an error's own period over which it is a cubic, rad: its second derivative, which the
 #: inertias feel, is then right to 0.3^2 / 12, less than one percent.
 PIECE_RAD = 0.3
-#: Newton's steps to the true angle: the error's slope is below 0.2, each step squares what is left.
-STEPS = 4
+#: Largest slope of an error over the angle: beyond it a reading may stand still while the shaft turns.
+STEEPEST = 0.5
+#: Newton's steps to the true angle: each squares what is left, from at most half a radian.
+STEPS = 6
 
 
 def errors_of(effects: Mapping[str, Effect], channel: str) -> tuple[tuple[float, float, float], ...]:
@@ -55,7 +57,16 @@ def true_motion(
 
     Returns:
         Breaks (n + 1,) and coefficients (4, n), n >= k.
+
+    Raises:
+        ValueError: the reading hardly rises with the angle, or falls.
     """
+    steepest = sum(order * abs(amplitude) for order, amplitude, _ in errors)
+    if steepest > STEEPEST:
+        raise ValueError(
+            f"the encoder's error changes by up to {steepest:.3g} rad a radian, and at most {STEEPEST} "
+            "can be taken out of its reading"
+        )
     breaks, c = _cut(breaks, coefficients, PIECE_RAD / max(order for order, _, _ in errors))
     width = np.diff(breaks)
     ends = []

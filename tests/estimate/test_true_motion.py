@@ -74,6 +74,19 @@ def test_an_encoder_says_the_sines_of_its_own_scale_alone():
     assert errors_of({}, "motor_angle") == ()
 
 
+def test_a_reading_that_may_stand_still_is_refused_with_the_field():
+    time = np.linspace(0.0, 1.0, 11)
+    line = np.array([10.0 * time[:-1], np.full(10, 10.0), np.zeros(10), np.zeros(10)])
+    with pytest.raises(ValueError, match=r"at most 0\.5"):
+        true_motion(time, line, ((64.0, 0.017, 0.0),))
+    ripple = [{"order": 64, "amplitude_arcsec": 3600}]
+    base = scenario({"sensors": {"motor_angle": {"ripple": ripple}}})
+    run = hdsim.simulate(scenario())
+    channels = {c: run[c] for c in ("motor_angle", "output_angle", "motor_torque")}
+    with pytest.raises(ArithmeticError, match=r"sensors.motor_angle: the encoder's error"):
+        bench_for([Record("r", run.time, channels)], [], base, None).predict(state_of(base))
+
+
 def test_what_follows_from_the_true_motion_is_predicted_from_an_eccentric_reading():
     # Without the correction the torque is missed by J a w^2, 5e-5 * 8.7e-3 * 175^2 = 0.013 N m.
     run = hdsim.simulate(scenario({"sensors": ECCENTRIC}))
