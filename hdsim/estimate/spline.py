@@ -26,16 +26,9 @@ STEPS_ALLOW = 1.1
 SLOW_KNOTS_TURNS, SLOW_KNOTS_S = 0.35, 0.25
 
 
-def smoothed(
-    time: Array,
-    values: Array,
-    *,
-    motion: bool = False,
-    step: float | None = None,
-    rate: tuple[Array, Mask] | None = None,
-) -> tuple[Array, Array]:
+def smoothed(time: Array, values: Array, *, step: float | None = None) -> tuple[Array, Array]:
     """Knots (k + 1,) and cubic coefficients (4, k) of the spline that ``spline_through`` takes."""
-    return pieces_of(spline_through(time, values, motion=motion, step=step, rate=rate)[0])
+    return pieces_of(spline_through(time, values, step=step)[0])
 
 
 def pieces_of(spline: BSpline | CubicSpline) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from hdsim.estimate.numbers import Free, base_freedoms
 from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, tie, together, with_delays
-from hdsim.estimate.spline import smoothed
+from hdsim.estimate.spline import pieces_of, smoothed, spline_through
 from hdsim.estimate.state import Added, state_of
 from hdsim.estimate.suspect import delays
 from hdsim.estimate.write import fitted_numbers
@@ -40,13 +40,13 @@ def test_smoothing_lets_the_acceleration_jump_where_friction_turns():
     inside = slice(200, -200)
     errors = []
     for may_jump in (False, True):
-        breaks, c = smoothed(t, measured, motion=may_jump)
+        breaks, c = pieces_of(spline_through(t, measured, motion=may_jump)[0])
         errors.append(float(np.std((PPoly(c[::-1], breaks)(t, 2) - acceleration)[inside])))
     assert errors[1] < 0.7 * errors[0]
     # A motion without a jump is left as it is.
     t, angle, _, _ = motion(6.0)
     noisy = angle + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
-    assert len(smoothed(t, noisy, motion=True)[0]) == len(smoothed(t, noisy)[0])
+    assert len(spline_through(t, noisy, motion=True)[0].c) == len(spline_through(t, noisy)[0].c)
 
 
 def test_smoothing_follows_the_motion_and_not_the_noise():

@@ -8,7 +8,7 @@ from scipy.interpolate import PPoly, make_lsq_spline
 from scipy.signal import butter, lfilter
 
 from hdsim.estimate.knots import least_squares_spline
-from hdsim.estimate.spline import smoothed
+from hdsim.estimate.spline import pieces_of, spline_through
 
 
 def knots_for(time, spacing):
@@ -72,6 +72,11 @@ def swing(seed, errors):
     return time, angle + 4e-3 * lasting, velocity, acceleration
 
 
+def followed(time, values, rate=None):
+    """Knots and coefficients of a motion."""
+    return pieces_of(spline_through(time, values, motion=True, rate=rate)[0])
+
+
 def acceleration_error(time, found, true):
     breaks, coefficients = found
     inside = slice(200, -200)
@@ -84,8 +89,8 @@ def test_a_measured_rate_keeps_lasting_errors_out_of_the_acceleration(seed):
     time, angle, velocity, acceleration = swing(seed, 0.8)
     noisy = 0.01 * velocity + 0.05 * np.random.default_rng(seed + 10).standard_normal(len(time))
     everywhere = np.ones(len(time), dtype=bool)
-    alone = smoothed(time, angle, motion=True)
-    judged = smoothed(time, angle, motion=True, rate=(noisy, everywhere))
+    alone = followed(time, angle)
+    judged = followed(time, angle, rate=(noisy, everywhere))
     assert acceleration_error(time, alone, acceleration) > 5.0
     assert acceleration_error(time, judged, acceleration) < 0.25
 
@@ -95,8 +100,8 @@ def test_a_rate_of_the_same_readings_changes_nothing(seed):
     # Differenced from the angle, as many controllers do: it tells nothing that the angle does not.
     time, angle, *_ = swing(seed, 0.0)
     rate = np.gradient(angle, time)
-    judged = smoothed(time, angle, motion=True, rate=(rate, np.ones(len(time), dtype=bool)))
-    for one, other in zip(judged, smoothed(time, angle, motion=True), strict=True):
+    judged = followed(time, angle, rate=(rate, np.ones(len(time), dtype=bool)))
+    for one, other in zip(judged, followed(time, angle), strict=True):
         assert np.array_equal(one, other)
 
 
@@ -108,8 +113,8 @@ def test_a_filtered_rate_leaves_what_is_fast_and_real(order, corner):
     angle = angle + 300.0 / w**2 * (1 - np.cos(w * time))
     velocity, acceleration = velocity + 300.0 / w * np.sin(w * time), acceleration + 300.0 * np.cos(w * time)
     rate = lfilter(*butter(order, corner, fs=1000.0), velocity)
-    judged = smoothed(time, angle, motion=True, rate=(rate, np.ones(len(time), dtype=bool)))
-    alone = acceleration_error(time, smoothed(time, angle, motion=True), acceleration)
+    judged = followed(time, angle, rate=(rate, np.ones(len(time), dtype=bool)))
+    alone = acceleration_error(time, followed(time, angle), acceleration)
     assert acceleration_error(time, judged, acceleration) < 1.1 * alone
 
 
@@ -123,6 +128,6 @@ def test_samples_that_a_log_repeats_and_loses_stay_out_of_the_acceleration():
     true = angle - 4e-3 * np.random.default_rng(0).standard_normal(len(time))  # without the errors of `swing`
     read = true[seen] + 2e-5 * np.random.default_rng(5).standard_normal(len(time))
     rate = velocity[seen] + 0.02 * np.random.default_rng(6).standard_normal(len(time))
-    judged = smoothed(time, read, motion=True, rate=(rate, np.ones(len(time), dtype=bool)))
-    assert acceleration_error(time, smoothed(time, read, motion=True), acceleration) > 20.0
+    judged = followed(time, read, rate=(rate, np.ones(len(time), dtype=bool)))
+    assert acceleration_error(time, followed(time, read), acceleration) > 20.0
     assert acceleration_error(time, judged, acceleration) < 0.1
