@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 import hdsim
 from hdsim.effects.sensors import Encoder, EncoderRipple, Sensors
 from hdsim.estimate.opening import bench_for
+from hdsim.estimate.predict import LEAD_IN_S
 from hdsim.estimate.records import Record
 from hdsim.estimate.state import state_of
 from hdsim.estimate.true_motion import errors_of, true_motion
@@ -122,3 +123,12 @@ def test_an_eccentric_motor_encoder_is_named_and_found():
     assert amplitude.value == pytest.approx(30.0, rel=0.1)
     gap = verdict.gap["motor_torque"]
     assert gap.after < 0.2 * gap.refit
+
+
+def test_the_outputs_own_reading_is_corrected_too_where_it_is_prescribed():
+    sensors = {"sensors": {"output_angle": {"eccentricity_arcmin": 20.0, "eccentricity_phase_deg": 40.0}}}
+    run = hdsim.simulate(scenario(sensors))
+    channels = {"output_angle": run["measured_output_angle"], "motor_torque": run["motor_torque"]}
+    (predictor,) = bench_for([Record("r", run.time, channels)], [], scenario(sensors), None).predictors
+    motor = predictor._motion(state_of(scenario(sensors)).candidate()).values(run.time + LEAD_IN_S)[0]
+    assert np.std(motor / predictor.ratio - run["output_angle"]) < 1e-9  # 2.1e-3 rad without
