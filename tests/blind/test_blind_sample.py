@@ -8,7 +8,7 @@ from running import attempt, stored, task_of
 
 #: Short logs of every kind.
 SAMPLE = (
-    "numpy/parameter/-/3/0",
+    pytest.param("numpy/parameter/-/3/0", marks=pytest.mark.study),
     "numpy/effect/-/4/0",
     "numpy/null/-/7/0",
 )

@@ -50,7 +50,7 @@ def kinova(joint: int):
 @pytest.mark.slow
 @pytest.mark.skipif(not KINOVA.exists(), reason="the recordings are not here")
 @pytest.mark.parametrize(
-    "joint", [pytest.param(j, marks=pytest.mark.study) if j in (6, 7) else j for j in FRICTION_NM]
+    "joint", [pytest.param(j, marks=pytest.mark.study) if j in (4, 6, 7) else j for j in FRICTION_NM]
 )
 def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_lists(joint):
     found = kinova(joint)

@@ -43,7 +43,11 @@ def varying_load(seconds: float = 5.0) -> np.ndarray:
     ("name", "component"),
     [
         ("load_dependent_kinematic_error", {"order": 2, "stiffness_nm_per_rad": 1000.0, "phase_deg": 30.0}),
-        ("kinematic_error", {"order": 2, "amplitude_arcmin": 0.2, "phase_deg": 30.0}),
+        pytest.param(
+            "kinematic_error",
+            {"order": 2, "amplitude_arcmin": 0.2, "phase_deg": 30.0},
+            marks=pytest.mark.study,
+        ),
     ],
 )
 def test_an_error_that_grows_with_the_load_is_told_from_one_that_does_not(tmp_path, name, component):

@@ -24,6 +24,8 @@ from hdsim.simulation.simulate import simulate
 from importing import SHIPPED, deviation, loaded  # isort: skip
 
 STEP = 1e-3
+#: Scenarios that take longest.
+LONG = ("sine_tracking", "move_and_settle")
 #: 20 rad/s^2 at the output until 2 rad/s: corners at 0.1 s and 0.2 s, on the grid of the communication.
 MOVE = {
     "type": "trapezoid",
@@ -102,7 +104,13 @@ def inputs(one: Scenario, whole: Recording) -> tuple[dict[str, Any], np.recarray
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(p, marks=pytest.mark.study, id=p.stem) if p.stem in LONG else pytest.param(p, id=p.stem)
+        for p in SHIPPED
+    ],
+)
 def test_every_shipped_scenario_has_its_torque(path: Path, tmp_path: Path) -> None:
     one = loaded(path)
     if (sampled := getattr(one.command.motor, "sample_period_s", None)) is not None:

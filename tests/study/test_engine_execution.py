@@ -203,7 +203,7 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.study), "2"])
 def test_study_killed_at_the_half_goes_on_and_gives_the_identical_table(tmp_path, whole, workers):
     path = tmp_path / "killed.yaml"
     path.write_text(STUDY)
