@@ -10,18 +10,18 @@ WORKERS ?= 2
 .PHONY: help run test test-fast test-studies check checked compiled setup lock schema picture site blind pythons clean
 
 help:
-	@echo "make run        simulate the seed drive; the log and the picture go to logs/"
-	@echo "make test       lint, types and the tests"
-	@echo "make test-fast  the same without the slow ones"
+	@echo "make run           simulate the seed drive; the log and the picture go to logs/"
+	@echo "make test          lint, types and the tests"
+	@echo "make test-fast     the same without the slow ones"
 	@echo "make test-studies  slow tests on further cases: what make test has no time for"
-	@echo "make setup      only install what is needed into $(VENV)"
-	@echo "make lock       resolve the development set anew (needs uv)"
-	@echo "make schema     write the JSON schemas of what people write anew"
-	@echo "make site       build the documentation into build/site, its gallery run, a warning being an error"
-	@echo "make pythons    install the wheel in every Python from 3.11 to 3.14 that there is, and run a user's tasks there"
-	@echo "make blind      hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
-	@echo "make picture    draw docs/images/seed_move.png and the pages' pictures anew (some need Chromium)"
-	@echo "make clean      remove $(VENV), caches and logs"
+	@echo "make setup         only install what is needed into $(VENV)"
+	@echo "make lock          resolve the development set anew (needs uv)"
+	@echo "make schema        write the JSON schemas of what people write anew"
+	@echo "make site          build the documentation into build/site, its gallery run, a warning being an error"
+	@echo "make pythons       install the wheel in every Python from 3.11 to 3.14 that there is, and run a user's tasks there"
+	@echo "make blind         hide effects in data and see what the diagnosis makes of them (hours; goes on where it stopped)"
+	@echo "make picture       draw docs/images/seed_move.png and the pages' pictures anew (some need Chromium)"
+	@echo "make clean         remove $(VENV), caches and logs"
 
 setup: $(STAMP)
 
@@ -52,7 +52,7 @@ test: checked
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10 -m "not study"
 
 test-fast: checked
-	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow and not study"
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow"
 
 test-studies: checked
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10 -m study

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -219,15 +219,21 @@ def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> l
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             there = point_at(bench, base, best.theta[: len(base.frees)])
             for other in others:
-                for free in fits_from(bench, base, there, other):
-                    ends += _to_its_end(bench, base, free, enough)
-                # The other numbers are far from what they are there: free at once, the shape may make up for
-                # them and leave the minimum before the fit has come near it.
-                for held in fits_from(bench, base, there, other.held()):
-                    *before, last = held.state.added
-                    freed = replace(other, coefficients=last.coefficients)
-                    begin = replace(held, state=replace(held.state, added=(*before, freed)))
-                    ends += _to_its_end(bench, base, begin, enough)
+                for each in _begun_at(bench, base, there, other):
+                    ends += _to_its_end(bench, base, each, enough)
+
+
+def _begun_at(bench: Bench, base: Fit, there: Point, other: Added) -> Iterator[Fit]:
+    """The model with an effect of other shapes, these free from the first step on, and held at first.
+
+    The other numbers are far from what they are there: free at once, the shapes may make up for them and
+    leave the minimum before the fit has come near it.
+    """
+    yield from fits_from(bench, base, there, other)
+    for held in fits_from(bench, base, there, other.held()):
+        *before, last = held.state.added
+        freed = replace(other, coefficients=last.coefficients)
+        yield replace(held, state=replace(held.state, added=(*before, freed)))
 
 
 def _at_next_minima(added: Added) -> list[Added]:

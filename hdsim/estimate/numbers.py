@@ -123,7 +123,7 @@ def base_freedoms(
 
     Args:
         state: the model.
-        channels: the predicted channels; the torque's sensitivity is free when the motor's torque is one.
+        channels: the predicted channels; the sensitivities of the torques among them are free.
         load_known: the output's torque is measured and given, so nothing of the load is free.
         locked: nothing moves but the drive's own spring: then only a second torque tells the sensitivity of
             one from stiffness and friction.

@@ -27,7 +27,7 @@ from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
 from hdsim.estimate.thin import Means
-from hdsim.estimate.true_motion import errors_of, true_motion
+from hdsim.estimate.true_motion import Sines, errors_of, true_motion
 from hdsim.estimate.unloaded import unloaded_angle
 from hdsim.estimate.zeros import Zero, between_zeros
 
@@ -132,7 +132,7 @@ class Predictor:
         self._coefficients[0] += angle
         self.motion = signal(self._breaks, self._coefficients, LEAD_IN_S)
         #: The last motion without an encoder's errors, by these.
-        self._true: dict[tuple[tuple[float, float, float], ...], SignalData] = {}
+        self._true: dict[Sines, SignalData] = {}
         motion = self.motion.values(self.record.time + LEAD_IN_S)
         #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
         self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
