@@ -58,22 +58,41 @@ def robust_covariance(
     power = max(float(np.mean(rest**2)), 1e-30)
     # The prior keeps a direction that the data say nothing about from having no spread at all.
     information = columns.T @ columns + np.diag(power / priors**2)
-    bread = np.linalg.inv(information)
+    sizes = np.sqrt(np.diag(information))
+    sizes[sizes == 0.0] = 1.0
+    bread = _inverse(information, sizes)
     order = np.argsort(blocks, kind="stable")
     ends = np.flatnonzero(np.diff(blocks[order])) + 1
     moves, parts = [], []
     for rows in np.split(order, ends):
         own = columns[rows]
         square = own.T @ own
-        without = np.linalg.inv(information - square)
+        without = _inverse(information - square, sizes)
         moves.append(without @ (own.T @ rest[rows]))
         parts.append(np.einsum("ij,jk,ik->i", without, square, without))
     away, variances = np.array(moves), np.array(parts)
     clustered = away.T @ away * (len(away) - 1) / len(away)
     clustered += bread @ np.diag(power**2 / priors**2) @ bread
     # Few blocks can make the clustered spread too small by chance: white noise is its least.
-    white = power * bread
-    low = np.maximum(1.0, np.sqrt(np.diag(white) / np.maximum(np.diag(clustered), 1e-300)))
+    white = power * np.diag(bread)
+    dead = np.flatnonzero(np.diag(clustered) == 0.0)
+    clustered[dead, dead] = white[dead]
+    low = np.maximum(1.0, np.sqrt(white / np.diag(clustered)))
     telling = variances.sum(axis=0) ** 2 / np.maximum((variances**2).sum(axis=0), 1e-300)
     scale = low * stdtrit(np.maximum(telling - 1.0, FEWEST_DEGREES), 0.975) / 2.0
     return np.asarray(clustered * np.outer(scale, scale))
+
+
+def _inverse(information: Array, sizes: Array) -> Array:
+    """Inverse of what is known of some numbers, shape (p, p).
+
+    One block may be all that tells of a number: what rounding leaves of the others counts as rounding, and
+    the number is as good as unknown without that block.
+
+    Args:
+        information: shape (p, p), positive but for rounding.
+        sizes: in whose units the numbers are alike, shape (p,).
+    """
+    values, vectors = np.linalg.eigh(information / np.outer(sizes, sizes))
+    values = np.maximum(values, len(sizes) * np.finfo(float).eps)
+    return np.asarray((vectors / values) @ vectors.T / np.outer(sizes, sizes))
