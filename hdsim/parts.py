@@ -190,6 +190,16 @@ class Builder(Protocol):
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh, as an angle at the output; below zero teeth are pressed."""
 
+    def wave_of_gap(self, amplitude_rad: float, by_motor: float, by_output: float, phase_rad: float) -> None:
+        """Let the half-gap of a lumped mesh go round with the angles of motor and output.
+
+        It is wider by amplitude sin(by_motor theta_m + by_output theta_o + phase), an angle at the output,
+        and nowhere below zero. A rigid mesh has no gap.
+
+        Raises:
+            InputError: the mesh has teeth, each with a gap of its own.
+        """
+
     def grow_gaps(self, growth: float) -> None:
         """Widen each tooth's own half-gap by a part of itself; a mesh without teeth has none."""
 
@@ -255,6 +265,7 @@ class Effect(Part):
         adds_to: its fields that come on top of a number of the drive, by that number's path in the drive.
         printed: whether catalogues print how large it is, so that ``effects: {set: catalogue}`` turns it on.
         of_teeth: what it says of the teeth, if anything.
+        finer: ways to fit it (``Fitting``) with more numbers, asked once it has its name.
     """
 
     title: ClassVar[str]
@@ -265,6 +276,7 @@ class Effect(Part):
     adds_to: ClassVar[tuple[tuple[str, str], ...]] = ()
     printed: ClassVar[bool] = False
     of_teeth: ClassVar[OfTeeth | None] = None
+    finer: ClassVar[tuple[Any, ...]] = ()
 
     @classmethod
     def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
 from hdsim.diagnosis.contest import Fitted
+from hdsim.diagnosis.finer import refined
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, Named, name_effect
@@ -151,6 +152,8 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         # A base that carried nothing could tell nothing of its springs.
         current = together(bench, current, rough=True) if current.undetermined else current
         current = sharpened(bench, current)
+    finer = refined(bench, base, current, during("fit", "asking for a finer formula"))
+    current = finer if finer is current else sharpened(bench, finer)
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:

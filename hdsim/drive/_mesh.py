@@ -33,11 +33,14 @@ from hdsim.drive._mesh_layout import (
     MESH_TWIST,
     ODD_COUNT,
     OUTPUT_SHARE,
+    PER_WAVE,
     RESULT_SIZE,
     SPRING_AT,
     SPRING_CELLS,
     SPRING_STEP,
     TWIST,
+    WAVES,
+    WAVES_AT,
 )
 from hdsim.drive._odd_tooth import odd_potential
 from hdsim.drive._quartic import spring
@@ -109,23 +112,44 @@ def table_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-de
 
 @mesh
 def lumped_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-def]
-    """The catalogue's spring over phi = theta_m / i - theta_o + e, behind an optional gap."""
+    """The catalogue's spring over phi = theta_m / i - theta_o + e, behind an optional gap.
+
+    The half-gap may go round with the angles, h = h_0 + sum A sin(a theta_m + b theta_o + p), nowhere below
+    zero. Of one potential U(|phi| - h) are the torques T (dphi - sign(T) dh).
+    """
     p = parameters
     twist = angles[0] * p[INVERSE_RATIO] - angles[2] + error[0]
     twist_m = p[INVERSE_RATIO] + error[1]
     twist_o = error[2] - 1.0
+    twist_mm, twist_mo, twist_oo = error[3], error[4], error[5]
+    gap, waves = p[EXTRA_GAP], int(p[WAVES])
+    for k in range(waves):
+        at = int(p[WAVES_AT]) + PER_WAVE * k
+        gap += p[at] * math.sin(p[at + 1] * angles[0] + p[at + 2] * angles[2] + p[at + 3])
     energy, torque, stiffness = spring(
-        p, int(p[SPRING_AT]), p[SPRING_STEP], p[SPRING_CELLS], twist, p[EXTRA_GAP]
+        p, int(p[SPRING_AT]), p[SPRING_STEP], p[SPRING_CELLS], twist, max(gap, 0.0)
     )
+    if torque != 0.0 and gap > 0.0:
+        sign = math.copysign(1.0, torque)
+        for k in range(waves):
+            at = int(p[WAVES_AT]) + PER_WAVE * k
+            a, b = p[at + 1], p[at + 2]
+            angle = a * angles[0] + b * angles[2] + p[at + 3]
+            sine, cosine = sign * p[at] * math.sin(angle), sign * p[at] * math.cos(angle)
+            twist_m -= a * cosine
+            twist_o -= b * cosine
+            twist_mm += a * a * sine
+            twist_mo += a * b * sine
+            twist_oo += b * b * sine
     for k in range(RESULT_SIZE):
         result[k] = 0.0
     result[ENERGY] = energy
     result[GRADIENT] = torque * twist_m
     result[GRADIENT + 2] = torque * twist_o
-    result[HESSIAN] = stiffness * twist_m * twist_m + torque * error[3]
-    result[HESSIAN + 2] = stiffness * twist_m * twist_o + torque * error[4]
+    result[HESSIAN] = stiffness * twist_m * twist_m + torque * twist_mm
+    result[HESSIAN + 2] = stiffness * twist_m * twist_o + torque * twist_mo
     result[HESSIAN + 3] = 1.0
-    result[HESSIAN + 5] = stiffness * twist_o * twist_o + torque * error[5]
+    result[HESSIAN + 5] = stiffness * twist_o * twist_o + torque * twist_oo
     result[MESH_TWIST] = twist
     result[TWIST] = twist
     result[ENGAGED] = math.nan

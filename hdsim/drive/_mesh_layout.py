@@ -40,7 +40,10 @@ SMOOTHING = 26  # half-width of the dead-zone's rounded corners, m
 CONSTANT_GAPS_AT = 27  # constant half-gaps of the teeth, twice over as the pitch errors; 0: none
 ODD_COUNT = 28  # teeth that differ from the drawn ones; 0: none
 ODD_AT = 29  # where they stand, ``PER_ODD`` numbers each
-HEADER = 30
+WAVES = 30  # of a lumped mesh's half-gap around the wave generator; 0: it is the same all round
+WAVES_AT = 31  # where they stand, ``PER_WAVE`` numbers each: amplitude (rad at the output), a, b, phase
+HEADER = 32
+PER_WAVE = 4
 
 # A tooth that differs, see ``hdsim.drive._odd_tooth``.
 ODD_MEMBER = 0  # 0 of the flexspline, 1 of the circular spline

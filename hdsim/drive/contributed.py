@@ -36,6 +36,7 @@ class Contributions:
     external: dict[str, int] = field(default_factory=dict)
     housing: tuple[int, float] | None = None
     half_gap_rad: float = 0.0
+    gap_waves: list[float] = field(default_factory=list)
     gap_growth: float = 0.0
     odd_teeth: list[OddTooth] = field(default_factory=list)
     play: bool = False
@@ -96,6 +97,10 @@ class Contributed:
     def widen_gap(self, half_gap_rad: float) -> None:
         """Add to the half-gap of the mesh (rad at the output); see ``hdsim.parts.Builder.widen_gap``."""
         self._given.half_gap_rad += half_gap_rad
+
+    def wave_of_gap(self, amplitude_rad: float, by_motor: float, by_output: float, phase_rad: float) -> None:
+        """Let the gap go round with the angles; see ``hdsim.parts.Builder.wave_of_gap``."""
+        self._given.gap_waves += [amplitude_rad, by_motor, by_output, phase_rad]
 
     def grow_gaps(self, growth: float) -> None:
         """Add to the growth of the gaps; see ``hdsim.parts.Builder.grow_gaps``."""

@@ -86,7 +86,8 @@ class Model(Contributed):
             self._contribute_drive()
             for part in self.parts:
                 part.contribute(self)
-            self._has_play = self._given.play or self._given.half_gap_rad > 0.0
+            given = self._given
+            self._has_play = given.play or given.half_gap_rad > 0.0 or bool(given.gap_waves)
             self._own_before = len(self._given.states)
             self._names = {state.name: OWN + k for k, state in enumerate(self._given.states)}
             self.input_frictions = tuple(self._given.input_frictions)
@@ -141,7 +142,12 @@ class Model(Contributed):
             parameters[_mesh_layout.SPRING_STEP] = step
             parameters[_mesh_layout.SPRING_CELLS] = spring.CELLS
             parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER
-            return _mesh.lumped_mesh, np.concatenate([parameters, numbers])
+            waves = self._given.gap_waves
+            parameters[_mesh_layout.WAVES] = len(waves) // _mesh_layout.PER_WAVE
+            parameters[_mesh_layout.WAVES_AT] = _mesh_layout.HEADER + len(numbers)
+            return _mesh.lumped_mesh, np.concatenate([parameters, numbers, waves])
+        if self._given.gap_waves:
+            raise InputError("the teeth of this mesh have gaps of their own: a play that goes round has none")
         self.teeth = kept_teeth.teeth_of(
             self.drive,
             mesh,

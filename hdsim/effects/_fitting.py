@@ -63,6 +63,7 @@ class Shape:
         starts: values where a fit may start, in rising order.
         over_range: the starts are divided by the largest value that the record has of this: ``torque_nm`` at
             the output, or ``motor_side_torque_nm``, if any.
+        of_range: likewise, multiplied by it.
         linear: the field is an angle or the like, whose neighbours lie at differences, not at ratios.
         least: what lies below is another effect's; divided like the starts.
         most: the same for what lies above.
@@ -72,6 +73,7 @@ class Shape:
     path: str
     starts: tuple[float, ...]
     over_range: str = ""
+    of_range: str = ""
     linear: bool = False
     least: float = 0.0
     most: float = math.inf
@@ -137,15 +139,16 @@ class Shape:
 
     def within(self, ranges: Mapping[str, float]) -> Shape:
         """The shape with its values divided by what they are over."""
-        if not self.over_range:
+        if not (self.over_range or self.of_range):
             return self
-        over = ranges[self.over_range]
+        unit = ranges[self.of_range] if self.of_range else 1.0 / ranges[self.over_range]
         return replace(
             self,
-            starts=tuple(value / over for value in self.starts),
-            least=self.least / over,
-            most=self.most / over,
+            starts=tuple(value * unit for value in self.starts),
+            least=self.least * unit,
+            most=self.most * unit,
             over_range="",
+            of_range="",
         )
 
     def report(self, value: float, deviation: float) -> Ranged:

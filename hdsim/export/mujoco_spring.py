@@ -31,7 +31,8 @@ class Probe(Contributed):
         self.seed = scenario.run.seed
         effect.contribute(self)
         self.frictions = self._given.input_frictions
-        self.only_spring = not (self._given.elements or self._given.twists or self._given.sensors)
+        given = self._given
+        self.only_spring = not (given.elements or given.twists or given.sensors or given.gap_waves)
         self.only_friction = len(self._given.elements) == len(self.frictions) == 1 and not self._given.twists
 
 

@@ -67,6 +67,7 @@ class Collector:
         self.states: list[State] = []
         self.compliances: list[Callable[[Any], Any]] = []
         self.half_gap = 0.0
+        self.gap_waves: list[tuple[float, float, float, float]] = []
         self.gap_growth = 0.0
         self.odd_teeth: list[OddTooth] = []
         self.moving_housing: tuple[int, float] | None = None
@@ -111,6 +112,10 @@ class Collector:
     def widen_gap(self, half_gap_rad: float) -> None:
         """See ``hdsim.parts.Builder.widen_gap``."""
         self.half_gap += half_gap_rad
+
+    def wave_of_gap(self, amplitude_rad: float, by_motor: float, by_output: float, phase_rad: float) -> None:
+        """See ``hdsim.parts.Builder.wave_of_gap``."""
+        self.gap_waves.append((amplitude_rad, by_motor, by_output, phase_rad))
 
     def grow_gaps(self, growth: float) -> None:
         """See ``hdsim.parts.Builder.grow_gaps``."""

@@ -53,6 +53,7 @@ UNITS = {
     "eccentricity_um": "µm",
     "extra_static_nm": "N m",
     "friction_nm": "N m",
+    "gap_spread": "",
     "heat_capacity_j_per_k": "J/K",
     "growth": "",
     "interference_arcmin": "arcmin",
@@ -68,6 +69,7 @@ UNITS = {
     "saturation_torque_nm": "N m",
     "saturation_twist_mrad": "mrad",
     "shift_um": "µm",
+    "uptake_torque_nm": "N m",
     "slip_torque_nm": "N m",
     "slip_twist_scale": "",
     "static_nm": "N m",
@@ -92,7 +94,7 @@ def at_unit(name: str, fitting: Fitting, orders=(2.0, 12.0)) -> Added:
     return Added(name, fitting, (1.0,) * fitting.count(orders), shapes, orders)
 
 
-ALL = [(name, fitting) for name, kind in catalogue().items() for fitting in kind.fittings]
+ALL = [(name, fitting) for name, kind in catalogue().items() for fitting in (*kind.fittings, *kind.finer)]
 
 
 @pytest.mark.parametrize(("name", "fitting"), ALL, ids=[f"{n} {f.label}".strip() for n, f in ALL])

@@ -38,6 +38,10 @@ EXPECTED = {
     "motor_torque_ripple.components.order": "",
     "motor_torque_ripple.components.phase_deg": "deg",
     "output_backlash.backlash_arcmin": "arcmin",
+    "output_backlash.components.amplitude_arcmin": "arcmin",
+    "output_backlash.components.phase_deg": "deg",
+    "output_backlash.gap_spread": "",
+    "output_backlash.uptake_torque_nm": "N m",
     "output_backlash.coefficient_per_nm": "1/(N m)",
     "output_eccentricity.eccentricity_um": "µm",
     "output_eccentricity.phase_deg": "deg",
@@ -98,7 +102,7 @@ def fitted_fields() -> set[str]:
     """Paths of all numbers that fittings of the catalogue report, without the places in lists."""
     found = set()
     for name, effect in catalogue().items():
-        for fitting in getattr(effect, "fittings", ()):
+        for fitting in (*getattr(effect, "fittings", ()), *effect.finer):
             paths = [shape.path for shape in fitting.shapes]
             for term in fitting.terms:
                 if isinstance(term, Amplitude):

@@ -1,0 +1,112 @@
+"""A named effect in a finer formula of the same law, where the data tell its further numbers.
+
+A contest asks for plain formulas: of an effect that is not identified yet more numbers say little, and would
+fit what is another's. Once it has its name, what its formula leaves may be what a finer one explains, as the
+play of many teeth, whose gaps differ, beside that of one. It is taken where it is better by more than the
+freedom of its further numbers is worth to the Bayesian information criterion (Schwarz 1978), and by as
+much of what was missing at first as a further effect would have to explain.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hdsim.diagnosis.again import BEYOND_GAIN
+from hdsim.diagnosis.starts import starts
+from hdsim.effects import catalogue
+from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.refit import REACHED
+from hdsim.estimate.state import Added
+from hdsim.nested import at
+
+#: Evaluations of a fit, and most times that it is carried on.
+EVALUATIONS, TIMES = 14, 2
+
+
+def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]) -> Fit:
+    """The model with its newest effect in a finer formula, if that explains what is left.
+
+    Args:
+        bench: the measured series.
+        base: the re-fitted model without effects.
+        current: the model.
+        tell: told what is being done.
+    """
+    noise = sum(bench.noise_powers.values())
+    *others, plain = current.state.added
+    begins = list(_begins(bench, current, plain))
+    if bench.power(current.predictions) <= REACHED * noise or not begins:
+        return current
+    tell(f"fitting a finer {plain.effect}")
+    with bench.coarse():
+        ends = [_at_its_end(bench, current, [*others, one]) for one in begins]
+        # The plain one may not have been at its end.
+        as_it_is = _at_its_end(bench, current, [*others, plain])
+    # At the end of a range its further numbers are told no more.
+    inside = [found for found in ends if found is not None and not found.state.added[-1].at_limit]
+    best = min(inside, key=lambda found: bench.power(found.predictions), default=current)
+    rest = bench.stacked(bench.residuals(best.predictions))
+    sample, power = bench.sample_power(rest), float(np.sum(rest**2))
+    further_numbers = best.state.added[-1].freedom - plain.freedom
+    worth = sample * math.log(max(power / sample, 2.0)) * further_numbers
+    explained = bench.power((as_it_is or current).predictions) - bench.power(best.predictions)
+    matters = BEYOND_GAIN * (bench.power(base.predictions) - noise)
+    return best if explained > max(worth, matters) else current
+
+
+def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
+    """An effect in the finer of its formulas, as large as it is: their further terms at none."""
+    finer: tuple[Fitting, ...] = catalogue()[plain.effect].finer
+    mesh = "toothed" if current.state.toothed else "toothless"
+    for fitting in finer:
+        if (
+            fitting.mesh not in ("", mesh)
+            or bench.turns < fitting.turns
+            or plain.fitting.label == fitting.label
+        ):
+            continue
+        for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
+            coefficients: list[float] = []
+            for term, part in one.fitting.parts(()):
+                coefficients += [_known(term, plain.settings())] * (part.stop - part.start)
+            yield replace(one, coefficients=tuple(coefficients))
+
+
+def _known(term: Any, settings: dict[str, Any]) -> float:
+    """Coefficient of a term that gives its fields the sizes that they have, 0 for fields without one."""
+    if isinstance(term, Amplitude):
+        for path, unit in term.units.items():
+            with contextlib.suppress(KeyError):
+                return float(at(settings, path)) / unit
+    return 0.0
+
+
+def _at_its_end(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
+    """All numbers fitted from where they are, with these effects, as far as that leads; None if nowhere."""
+    found = _fitted(bench, current, added)
+    for _ in range(TIMES):
+        further = None if found is None else _fitted(bench, found, list(found.state.added))
+        if found is None or further is None:
+            break
+        if bench.power(further.predictions) >= bench.power(found.predictions):
+            break
+        found = further
+    return found
+
+
+def _fitted(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
+    state = replace(current.state, added=tuple(added))
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        return fit(
+            bench, state, at_present(current), prune=False, evaluations=EVALUATIONS, after=current, rough=True
+        )
+    return None

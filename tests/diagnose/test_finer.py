@@ -1,0 +1,106 @@
+"""A play that has its name, in the formula of many teeth where the data tell it, and only there."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hdsim
+from hdsim.diagnosis.finer import refined
+from hdsim.diagnosis.starts import starts
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.records import Record
+from hdsim.estimate.refit import refit, together
+from hdsim.estimate.state import state_of
+from hdsim.scenario import Scenario
+
+PLAY = "output_backlash"
+NOISE = {"motor_angle": 2e-5, "output_angle": 2e-6, "motor_torque": 6e-3}
+MANY = {
+    "backlash_arcmin": 1.0, "gap_spread": 0.5, "uptake_torque_nm": 4.0,
+    "components": [{"order": 2, "amplitude_arcmin": 0.08, "phase_deg": 40.0}],
+}  # fmt: skip
+LUMPED = {"model": "lumped"}
+#: Every tooth a contact of its own, with the gap of its own flanks.
+TOOTHED = {"model": "teeth", "ring": "static", "gap_factor": 3.0}
+
+
+def scenario(mesh: dict[str, Any], effects: dict[str, Any]) -> Scenario:
+    return Scenario.model_validate({
+        "drive": {"preset": "seed-2021", "mesh": mesh},
+        "effects": effects,
+        "command": {"motor": {
+            "type": "position",
+            "at": "output",
+            "trajectory": {"type": "sine", "amplitude_deg": 30.0, "frequency_hz": 0.5},
+            "controller": {
+                "type": "cascade",
+                "position_gain_per_s": 30,
+                "velocity_gain_nm_s_per_rad": 0.025,
+                "velocity_integral_gain_nm_per_rad": 0.5,
+            },
+        }},
+        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
+        "run": {"duration_s": 8.0, "sample_rate_hz": 250.0, "teeth_rate_hz": 0.0},
+    })  # fmt: skip
+
+
+def with_play(mesh: dict[str, Any], effects: dict[str, Any]) -> tuple[Bench, Fit, Fit]:
+    """A log of a drive, the lumped base re-fitted to it, and that with a plain play."""
+    run = hdsim.simulate(scenario(mesh, effects))
+    rng = np.random.default_rng(0)
+    # How the load swings in before it is driven, nobody could know from the log.
+    rows = run.time >= 2.0
+    time = run.time[rows] - 2.0
+    channels = {c: run[c][rows] + size * rng.standard_normal(len(time)) for c, size in NOISE.items()}
+    base = scenario(LUMPED, {})
+    bench = bench_for([Record("r", time, channels)], [], base, None)
+    found = refit(bench, state_of(base)).fit
+    plain = next(f for f in catalogue()[PLAY].fittings if f.play and not f.label)
+    (added,) = starts(PLAY, plain, (), bench.ranges(found.state))
+    added = replace(added, coefficients=(0.5 / added.settings()["backlash_arcmin"],))
+    state = replace(found.state, added=(added,))
+    one = fit(bench, state, at_present(found), prune=False, after=found, evaluations=20, rough=True)
+    return bench, found, together(bench, one, rough=True)
+
+
+def beyond(bench: Bench, found: Fit) -> float:
+    return bench.power(found.predictions) / sum(bench.noise_powers.values()) - 1.0
+
+
+@pytest.mark.slow
+def test_the_play_of_many_teeth_is_found_again() -> None:
+    bench, base, plain = with_play(LUMPED, {PLAY: MANY})
+    found = together(bench, refined(bench, base, plain, lambda _: None))
+    own = found.state.added[0].settings()
+    assert beyond(bench, found) < 0.1
+    # When the last tooth bears is hardly told from the stiffness beyond; with it goes the mean of the gaps.
+    assert own["backlash_arcmin"] == pytest.approx(1.0, rel=0.3)
+    assert own["gap_spread"] == pytest.approx(0.5, abs=0.15)
+    assert 2.0 < own["uptake_torque_nm"] < 20.0
+    first = own["backlash_arcmin"] * (1.0 - own["gap_spread"])
+    assert first == pytest.approx(0.5, rel=0.1)
+    second, fourth = own["components"]
+    assert second["amplitude_arcmin"] == pytest.approx(0.08, rel=0.15)
+    assert second["phase_deg"] == pytest.approx(40.0, abs=8.0)
+    assert fourth["amplitude_arcmin"] < 0.02
+
+
+@pytest.mark.slow
+def test_of_a_drive_with_every_tooth_it_leaves_less_than_half_of_what_a_plain_play_does() -> None:
+    bench, base, plain = with_play(TOOTHED, {})
+    found = refined(bench, base, plain, lambda _: None)
+    assert beyond(bench, plain) < 0.5 * beyond(bench, base)
+    assert beyond(bench, found) < 0.5 * beyond(bench, plain)
+    assert found.state.added[0].fitting.label == "of many teeth"
+
+
+@pytest.mark.slow
+def test_a_sharp_play_stays_as_it_is() -> None:
+    bench, base, plain = with_play(LUMPED, {PLAY: {"backlash_arcmin": 1.0}})
+    assert beyond(bench, plain) < 0.2
+    assert refined(bench, base, plain, lambda _: None) is plain
