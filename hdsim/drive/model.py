@@ -137,8 +137,8 @@ class Model(Contributed):
             step, numbers = spring.catalogue_numbers(self.drive.torsion, tuple(self._given.wind_ups), reach)
             parameters = np.zeros(_mesh_layout.HEADER)
             parameters[_mesh_layout.INVERSE_RATIO] = 1 / self.ratio
-            # A lumped mesh has no teeth to press together: a preload only takes up play.
-            parameters[_mesh_layout.EXTRA_GAP] = max(self._given.half_gap_rad, 0.0)
+            # Below zero where it is preloaded: without teeth to press that takes up play only.
+            parameters[_mesh_layout.EXTRA_GAP] = self._given.half_gap_rad
             parameters[_mesh_layout.SPRING_STEP] = step
             parameters[_mesh_layout.SPRING_CELLS] = spring.CELLS
             parameters[_mesh_layout.SPRING_AT] = _mesh_layout.HEADER

@@ -26,6 +26,29 @@ WAVES = [
 ]
 
 
+#: The output held, the motor turned to and fro.
+TWISTED = {
+    "command": {
+        "motor": {
+            "type": "motion",
+            "trajectory": {"type": "sine", "amplitude_deg": 12, "frequency_hz": 0.5},
+        },
+        "output": {"type": "locked"},
+    },
+    "load": {"inertia_kg_m2": 0.1},
+    "run": {"duration_s": 2.0, "sample_rate_hz": 200},
+}
+
+
+def around(motor: np.ndarray, components: list[dict[str, Any]]) -> np.ndarray:
+    """What components add to the half-gap at the motor's angles, the output held, rad."""
+    waves = [
+        c["amplitude_arcmin"] * ARCMIN * np.sin(c["order"] * motor + math.radians(c["phase_deg"]))
+        for c in components
+    ]
+    return np.sum([np.zeros_like(motor), *waves], axis=0)
+
+
 def scenario(effect: dict[str, Any], **sections: Any) -> Scenario:
     torsion = {f"stiffness_k{k}_nm_per_rad": STIFFNESS for k in (1, 2, 3)} | {"damping_nm_s_per_rad": 0.0}
     return Scenario.model_validate(
@@ -42,32 +65,28 @@ def test_it_is_the_sum_of_teeth_whose_gaps_differ(components: list[dict[str, Any
     effect = {
         "backlash_arcmin": PLAY, "gap_spread": SPREAD, "uptake_torque_nm": UPTAKE, "components": components
     }  # fmt: skip
-    run = build_run(
-        scenario(
-            effect,
-            command={
-                "motor": {
-                    "type": "motion",
-                    "trajectory": {"type": "sine", "amplitude_deg": 12, "frequency_hz": 0.5},
-                },
-                "output": {"type": "locked"},
-            },
-            load={"inertia_kg_m2": 0.1},
-            run={"duration_s": 2.0, "sample_rate_hz": 200},
-        )
-    ).record()
+    run = build_run(scenario(effect, **TWISTED)).record()
     motor = np.asarray(run["motor_angle"])
     twist = motor / -100.0
     teeth = 4000
     gaps = 0.5 * PLAY * ARCMIN * (1 + SPREAD * (2 * (np.arange(teeth) + 0.5) / teeth - 1))
-    around = sum(
-        c["amplitude_arcmin"] * ARCMIN * np.sin(c["order"] * motor + math.radians(c["phase_deg"]))
-        for c in components
-    )
-    past = np.maximum(np.abs(twist)[:, None] - (gaps + np.reshape(around, (-1, 1))), 0.0)
+    past = np.maximum(np.abs(twist)[:, None] - (gaps + around(motor, components)[:, None]), 0.0)
     expected = np.sign(twist) * STIFFNESS * past.mean(axis=1)
     assert np.ptp(expected) > 30
     assert np.count_nonzero(expected == 0.0) > 5
+    np.testing.assert_allclose(run["output_torque"], expected, atol=2e-4 * np.max(np.abs(expected)))
+
+
+def test_a_preload_takes_up_what_goes_round() -> None:
+    effects = {
+        "output_backlash": {"backlash_arcmin": 0.0, "components": WAVES},
+        "mesh_preload": {"interference_arcmin": 0.01},
+    }
+    run = build_run(scenario({}, effects=effects, **TWISTED)).record()
+    motor = np.asarray(run["motor_angle"])
+    gap = np.maximum(around(motor, WAVES) - 0.01 * ARCMIN, 0.0)
+    assert 0.1 < np.mean(gap > 0) < 0.9
+    expected = np.sign(motor / -100.0) * STIFFNESS * np.maximum(np.abs(motor / 100.0) - gap, 0.0)
     np.testing.assert_allclose(run["output_torque"], expected, atol=2e-4 * np.max(np.abs(expected)))
 
 
