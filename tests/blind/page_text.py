@@ -73,8 +73,8 @@ those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
 page of this version none is left out. Its test cases are of a seed of which no case had been looked at when
-they were run: as many as the time allowed. Those of `teeth` are of an earlier state of the search, the others
-of the present one.
+they were run: as many as the time allowed. They are of a search that did not ask for the play of many teeth
+yet, those of `teeth` of an older one still.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, with their evidence: `python tests/blind
 page` generates the page from them, and `decide` can judge every one again.

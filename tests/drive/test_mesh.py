@@ -189,12 +189,17 @@ def test_a_lumped_mesh_knows_a_preload_only_as_less_play() -> None:
     from hdsim.effects.output_backlash import OutputBacklash
 
     drive = Drive.model_validate({"preset": "seed-2021", "mesh": {"model": "lumped"}})
-    gaps = []
-    for preload in (0.1, 0.6):
+    arcmin = np.pi / 10800
+    for preload, half_gap in ((0.1, 0.1), (0.2, 0.0), (0.6, 0.0)):
         parts = [OutputBacklash(backlash_arcmin=0.4), MeshPreload(interference_arcmin=preload)]
-        model = Model(drive, parts, load_inertia_kg_m2=0.5)
-        gaps.append(model._mesh_parameters()[1][_mesh_layout.EXTRA_GAP])
-    assert gaps == [pytest.approx(0.1 * np.pi / 10800), 0.0]
+        kernel, numbers = Model(drive, parts, load_inertia_kg_m2=0.5)._mesh_parameters()
+        assert kernel is not None
+        for twist in (-0.3, -0.05, 0.05, 0.3):
+            result = np.zeros(_mesh_layout.RESULT_SIZE)
+            kernel.function(np.array([0.0, 0.0, -twist * arcmin]), np.zeros(6), numbers, result)
+            past = np.sign(twist) * max(abs(twist) - half_gap, 0.0) * arcmin
+            wanted = drive.torsion.stiffness_k1_nm_per_rad * past
+            assert -result[_mesh_layout.GRADIENT + 2] == pytest.approx(wanted, rel=1e-9)
 
 
 def test_the_widest_edge_shares_the_load_as_an_elliptical_flexspline() -> None:
