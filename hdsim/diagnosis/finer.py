@@ -10,7 +10,6 @@ much of what was missing at first as a further effect would have to explain.
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -22,7 +21,8 @@ from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.covariance import worth_of_a_number
+from hdsim.estimate.fit import Fit, at_present, fit, sharpened
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import REACHED
 from hdsim.estimate.state import Added
@@ -55,24 +55,20 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
     inside = [found for found in ends if found is not None and not found.state.added[-1].at_limit]
     best = min(inside, key=lambda found: bench.power(found.predictions), default=current)
     rest = bench.stacked(bench.residuals(best.predictions))
-    sample, power = bench.sample_power(rest), float(np.sum(rest**2))
     further_numbers = best.state.added[-1].freedom - plain.freedom
-    worth = sample * math.log(max(power / sample, 2.0)) * further_numbers
+    worth = further_numbers * worth_of_a_number(rest, bench.stacked_blocks())
     explained = bench.power((as_it_is or current).predictions) - bench.power(best.predictions)
     matters = BEYOND_GAIN * (bench.power(base.predictions) - noise)
-    return best if explained > max(worth, matters) else current
+    return sharpened(bench, best) if best is not current and explained > max(worth, matters) else current
 
 
 def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
     """An effect in the finer of its formulas, as large as it is: their further terms at none."""
     finer: tuple[Fitting, ...] = catalogue()[plain.effect].finer
-    mesh = "toothed" if current.state.toothed else "toothless"
     for fitting in finer:
-        if (
-            fitting.mesh not in ("", mesh)
-            or bench.turns < fitting.turns
-            or plain.fitting.label == fitting.label
-        ):
+        if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
+            continue
+        if plain.fitting.label == fitting.label:
             continue
         for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
             coefficients: list[float] = []

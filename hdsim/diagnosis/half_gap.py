@@ -155,7 +155,7 @@ def _worn_otherwise(bench: Bench, found: Fit, k: int, of: OfTeeth, gap: float) -
         except ValidationError:
             continue  # an effect that only widens says nothing of narrower gaps
         fittings: tuple[Fitting, ...] = getattr(effect, "fittings", ())
-        fitting = next(each for each in fittings if each.mesh in ("", "toothed"))
+        fitting = next(each for each in fittings if each.of_mesh(True))
         unit = Added(name, fitting, (1.0,))
         one = replace(unit, coefficients=(value / unit.settings()[says.field],))
         other = replace(state, added=(*state.added[:k], one, *state.added[k + 1 :]))

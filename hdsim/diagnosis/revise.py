@@ -17,7 +17,7 @@ import numpy as np
 from hdsim.diagnosis.name import MISMATCH, Named, confusable
 from hdsim.estimate.asked import gone_with
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import correlation
+from hdsim.estimate.covariance import worth_of_a_number
 from hdsim.estimate.fit import Fit, added_spreads, fit, settled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import together
@@ -175,8 +175,7 @@ def needed(bench: Bench, less: Fit, whole: Fit) -> float:
     best = 0.0
     for channel in bench.channels:
         rows = np.isin(series, [k for k, s in enumerate(bench.series) if s.channel == channel])
-        alike = correlation(rest[rows], blocks[rows])
-        worth = float(np.mean(rest[rows] ** 2)) * alike * math.log(max(rows.sum() / alike, 2.0))
+        worth = worth_of_a_number(rest[rows], blocks[rows])
         beyond, gained = before[channel] - noise[channel], before[channel] - after[channel]
         if gained > worth * max(numbers, 1) and beyond > EXCESS * noise[channel]:
             best = max(best, min(gained / beyond, 1.0))

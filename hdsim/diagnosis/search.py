@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -152,8 +153,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         # A base that carried nothing could tell nothing of its springs.
         current = together(bench, current, rough=True) if current.undetermined else current
         current = sharpened(bench, current)
-    finer = refined(bench, base, current, during("fit", "asking for a finer formula"))
-    current = finer if finer is current else sharpened(bench, finer)
+    current = refined(bench, base, current, partial(during, "fit"))
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:

@@ -113,7 +113,7 @@ def screen(
         for fitting in fittings:
             if any(channel not in bench.channels for channel in fitting.needs):
                 continue
-            if fitting.mesh and fitting.mesh != ("toothed" if state.toothed else "toothless"):
+            if not fitting.of_mesh(state.toothed):
                 continue
             if not measured.issuperset(fitting.follows) or measured.intersection(fitting.unless):
                 continue

@@ -138,7 +138,7 @@ class Shape:
         return value <= max(self.least, low) * (1.0 + LIMIT) or value >= min(self.most, high) / (1.0 + LIMIT)
 
     def within(self, ranges: Mapping[str, float]) -> Shape:
-        """The shape with its values divided by what they are over."""
+        """The shape with its values in its own unit, where they are parts of a range or of its inverse."""
         if not (self.over_range or self.of_range):
             return self
         unit = ranges[self.of_range] if self.of_range else 1.0 / ranges[self.over_range]
@@ -211,6 +211,10 @@ class Fitting:
     def play(self) -> bool:
         """Whether it fits the width of a play."""
         return any(term.play for term in self.terms)
+
+    def of_mesh(self, toothed: bool) -> bool:
+        """Whether it is asked of a model with teeth, or of one without."""
+        return self.mesh in ("", "toothed" if toothed else "toothless")
 
     def count(self, orders: Sequence[float]) -> int:
         """Number of coefficients."""

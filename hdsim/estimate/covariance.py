@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +28,15 @@ def correlation(rest: Array, blocks: NDArray[np.int64]) -> float:
 def sample_power(rest: Array, blocks: NDArray[np.int64]) -> float:
     """What one independent sample of a residual counts: its power, times the samples that it stands for."""
     return max(float(np.mean(rest**2)), 1e-30) * correlation(rest, blocks)
+
+
+def worth_of_a_number(rest: Array, blocks: NDArray[np.int64]) -> float:
+    """Power that one more free number must explain by the Bayesian information criterion (Schwarz 1978).
+
+    It is that of an independent sample, times the logarithm of how many there are.
+    """
+    count = max(len(rest) / correlation(rest, blocks), 2.0)
+    return sample_power(rest, blocks) * math.log(count)
 
 
 def robust_covariance(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 import hdsim
@@ -36,6 +39,29 @@ def scenario(tmp_path, mesh: str = "rigid", **changes) -> Scenario:
         part = getattr(loaded.drive, section).model_copy(update=values)
         loaded = loaded.model_copy(update={"drive": loaded.drive.model_copy(update={section: part})})
     return loaded
+
+
+def servo_with_arm(
+    mesh: Mapping[str, Any], effects: Mapping[str, Any], *, frequency_hz: float = 0.25, **run: float
+) -> Scenario:
+    """The seed drive with an arm that a position loop swings to and fro."""
+    return Scenario.model_validate({
+        "drive": {"preset": "seed-2021", "mesh": mesh},
+        "effects": effects,
+        "command": {"motor": {
+            "type": "position",
+            "at": "output",
+            "trajectory": {"type": "sine", "amplitude_deg": 30.0, "frequency_hz": frequency_hz},
+            "controller": {
+                "type": "cascade",
+                "position_gain_per_s": 30,
+                "velocity_gain_nm_s_per_rad": 0.025,
+                "velocity_integral_gain_nm_per_rad": 0.5,
+            },
+        }},
+        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
+        "run": {"duration_s": 8.0, "sample_rate_hz": 250.0} | run,
+    })  # fmt: skip
 
 
 def motion(seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

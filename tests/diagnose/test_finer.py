@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnose_bench import servo_with_arm
 
 import hdsim
 from hdsim.diagnosis.finer import refined
@@ -30,23 +31,7 @@ TOOTHED = {"model": "teeth", "ring": "static", "gap_factor": 3.0}
 
 
 def scenario(mesh: dict[str, Any], effects: dict[str, Any]) -> Scenario:
-    return Scenario.model_validate({
-        "drive": {"preset": "seed-2021", "mesh": mesh},
-        "effects": effects,
-        "command": {"motor": {
-            "type": "position",
-            "at": "output",
-            "trajectory": {"type": "sine", "amplitude_deg": 30.0, "frequency_hz": 0.5},
-            "controller": {
-                "type": "cascade",
-                "position_gain_per_s": 30,
-                "velocity_gain_nm_s_per_rad": 0.025,
-                "velocity_integral_gain_nm_per_rad": 0.5,
-            },
-        }},
-        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
-        "run": {"duration_s": 8.0, "sample_rate_hz": 250.0, "teeth_rate_hz": 0.0},
-    })  # fmt: skip
+    return servo_with_arm(mesh, effects, frequency_hz=0.5, teeth_rate_hz=0.0)
 
 
 def with_play(mesh: dict[str, Any], effects: dict[str, Any]) -> tuple[Bench, Fit, Fit]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnose_bench import servo_with_arm
 
 import hdsim
 from hdsim.diagnosis.again import left_of
@@ -27,23 +28,7 @@ NOISE = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3}
 
 
 def scenario(effects: dict[str, Any]) -> Scenario:
-    return Scenario.model_validate({
-        "drive": {"preset": "seed-2021", "mesh": {"model": "lumped"}},
-        "effects": effects,
-        "command": {"motor": {
-            "type": "position",
-            "at": "output",
-            "trajectory": {"type": "sine", "amplitude_deg": 30.0, "frequency_hz": 0.25},
-            "controller": {
-                "type": "cascade",
-                "position_gain_per_s": 30,
-                "velocity_gain_nm_s_per_rad": 0.025,
-                "velocity_integral_gain_nm_per_rad": 0.5,
-            },
-        }},
-        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
-        "run": {"duration_s": 8.0, "sample_rate_hz": 250.0},
-    })  # fmt: skip
+    return servo_with_arm({"model": "lumped"}, effects)
 
 
 def opened(slip_nm: float, scale: float) -> tuple[Bench, Fit]:
