@@ -21,7 +21,7 @@ from hdsim.diagnosis.candidate_fits import (
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, designs
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit
+from hdsim.estimate.fit import Fit, strain
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import REACHED
@@ -154,10 +154,4 @@ def against_priors(bench: Bench, results: Sequence[tuple[str, Fit, Array]]) -> l
     """
     best = min(results, key=lambda result: float(result[2].sum()))[1]
     power = bench.sample_power(bench.stacked(bench.residuals(best.predictions)))
-
-    def strain(found: Fit) -> float:
-        return sum(
-            ((float(t) - f.none) / f.prior) ** 2 for f, t in zip(found.frees, found.theta, strict=True)
-        )
-
     return [(name, found, losses + power * strain(found) / len(losses)) for name, found, losses in results]

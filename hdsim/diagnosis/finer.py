@@ -2,27 +2,31 @@
 
 A contest asks for plain formulas: of an effect that is not identified yet more numbers say little, and would
 fit what is another's. Once it has its name, what its formula leaves may be what a finer one explains, as the
-play of many teeth, whose gaps differ, beside that of one. It is taken where it is better by more than the
-freedom of its further numbers is worth to the Bayesian information criterion (Schwarz 1978), and by as
-much of what was missing at first as a further effect would have to explain.
+play of many teeth, whose gaps differ, beside that of one. It is taken where it is better, priors included, by
+more than the freedom of its further numbers is worth to the Bayesian information criterion (Schwarz 1978),
+and by as much of what was missing at first as a further effect would have to explain, or a tenth of what is
+left. A plain formula may have bent the base to stand in for what it lacks, so a finer one is fitted from the
+base's numbers as given, too.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from hdsim.diagnosis.again import BEYOND_GAIN
+from hdsim.diagnosis.again import BEYOND_GAIN, NEWS
+from hdsim.diagnosis.contest import FAR
+from hdsim.diagnosis.revise import EXCESS
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import worth_of_a_number
-from hdsim.estimate.fit import Fit, at_present, fit, sharpened
+from hdsim.estimate.covariance import sample_power, worth_of_a_number
+from hdsim.estimate.fit import Fit, at_present, fit, sharpened, strain
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import REACHED
 from hdsim.estimate.state import Added
@@ -49,17 +53,45 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
     tell(f"fitting a finer {plain.effect}")
     with bench.coarse():
         ends = [_at_its_end(bench, current, [*others, one]) for one in begins]
+        frees = at_present(current)
+        # A plain formula may have bent the base to stand in for what it lacks.
+        if any(abs(free.none) > FAR for free in frees if not free.step):
+            as_given = {free.name: free.none for free in frees}
+            ends += [_at_its_end(bench, current, [*others, one], as_given) for one in begins]
         # The plain one may not have been at its end.
         as_it_is = _at_its_end(bench, current, [*others, plain])
+    plain_end = as_it_is or current
     # At the end of a range its further numbers are told no more.
     inside = [found for found in ends if found is not None and not found.state.added[-1].at_limit]
-    best = min(inside, key=lambda found: bench.power(found.predictions), default=current)
-    rest = bench.stacked(bench.residuals(best.predictions))
-    further_numbers = best.state.added[-1].freedom - plain.freedom
-    worth = further_numbers * worth_of_a_number(rest, bench.stacked_blocks())
-    explained = bench.power((as_it_is or current).predictions) - bench.power(best.predictions)
-    matters = BEYOND_GAIN * (bench.power(base.predictions) - noise)
-    return sharpened(bench, best) if best is not current and explained > max(worth, matters) else current
+    least = min([plain_end, *inside], key=lambda found: bench.power(found.predictions))
+    rest, blocks = bench.stacked(bench.residuals(least.predictions)), bench.stacked_blocks()
+    sample, number = sample_power(rest, blocks), worth_of_a_number(rest, blocks)
+
+    def cost(found: Fit) -> float:
+        """Of the data, of the priors, and of the effect's numbers."""
+        power, freedom = bench.power(found.predictions), found.state.added[-1].freedom
+        return power + sample * strain(found) + number * freedom
+
+    best = min(inside, key=cost, default=plain_end)
+    missing, left = (bench.power(each.predictions) - noise for each in (base, plain_end))
+    matters = min(BEYOND_GAIN * missing, max(NEWS * left, EXCESS * noise))
+    return sharpened(bench, best) if cost(plain_end) - cost(best) > matters else current
+
+
+def each_refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]) -> Fit:
+    """The model with each of its effects in a finer formula where that explains what the others leave.
+
+    Args:
+        bench: the measured series.
+        base: the re-fitted model without effects.
+        current: the model.
+        tell: told what is being done.
+    """
+    count = len(current.state.added)
+    for _ in range(count):
+        # Each in turn is the newest; after as many turns they stand as they did.
+        current = refined(bench, base, current.ordered([count - 1, *range(count - 1)]), tell)
+    return current
 
 
 def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
@@ -86,9 +118,11 @@ def _known(term: Any, settings: dict[str, Any]) -> float:
     return 0.0
 
 
-def _at_its_end(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
+def _at_its_end(
+    bench: Bench, current: Fit, added: list[Added], theta: Mapping[str, float] | None = None
+) -> Fit | None:
     """All numbers fitted from where they are, with these effects, as far as that leads; None if nowhere."""
-    found = _fitted(bench, current, added)
+    found = _fitted(bench, current, added, theta)
     for _ in range(TIMES):
         further = None if found is None else _fitted(bench, found, list(found.state.added))
         if found is None or further is None:
@@ -99,10 +133,19 @@ def _at_its_end(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
     return found
 
 
-def _fitted(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
+def _fitted(
+    bench: Bench, current: Fit, added: list[Added], theta: Mapping[str, float] | None = None
+) -> Fit | None:
     state = replace(current.state, added=tuple(added))
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         return fit(
-            bench, state, at_present(current), prune=False, evaluations=EVALUATIONS, after=current, rough=True
+            bench,
+            state,
+            at_present(current),
+            prune=False,
+            evaluations=EVALUATIONS,
+            theta=theta,
+            after=current,
+            rough=True,
         )
     return None

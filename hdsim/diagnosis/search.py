@@ -16,7 +16,7 @@ import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
 from hdsim.diagnosis.contest import Fitted
-from hdsim.diagnosis.finer import refined
+from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, Named, name_effect
@@ -95,6 +95,9 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
 
 def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Search:
     """The search's last fit carried on to its optimum, without needless names, with the covariance there."""
+    if len(found.named) > 1:
+        # What another effect did may have hidden what a finer formula does.
+        found.fit = each_refined(bench, base, found.fit, partial(during, "fit"))
     found.fit = together(bench, found.fit)
     if found.named:
         tell = during("again", "testing each effect beside the others")

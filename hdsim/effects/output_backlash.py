@@ -88,24 +88,25 @@ class OutputBacklash(Effect):
         ),
     )
 
-    finer: ClassVar[tuple[Fitting, ...]] = (
+    finer: ClassVar[tuple[Fitting, ...]] = tuple(
         Fitting(
             (
                 Amplitude({"backlash_arcmin": 0.1}, of_range="twist_arcmin", play=True),
                 *(
                     Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.02)
-                    for k in range(2)
+                    for k in range(len(orders))
                 ),
             ),
             (
                 Shape("uptake_torque_nm", (0.03, 0.2), of_range="torque_nm", most=1.0),
                 Shape("gap_spread", (0.4,), linear=True),
             ),
-            settings={"components": [{"order": order, "amplitude_arcmin": 0.0} for order in (2, 4)]},
-            label="of many teeth",
-            turns=1.0,
+            settings={"components": [{"order": order, "amplitude_arcmin": 0.0} for order in orders]},
+            label=label,
+            turns=1.0 if orders else 0.0,
             mesh="toothless",
-        ),
+        )
+        for label, orders in (("of many teeth", (2, 4)), ("of gaps that differ", ()))
     )
 
     # Ten degrees: no gear.

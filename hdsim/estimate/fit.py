@@ -201,6 +201,11 @@ def at_present(found: Fit) -> list[Free]:
     return [free.moved(float(t)) for free, t in zip(found.frees, found.theta, strict=True)]
 
 
+def strain(found: Fit) -> float:
+    """Squared prior spreads that a fit's numbers of the base are away from what they were given as."""
+    return sum(((float(t) - f.none) / f.prior) ** 2 for f, t in zip(found.frees, found.theta, strict=True))
+
+
 def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
     """The base's numbers with 95 % intervals; those that the data do not bound are marked undetermined.
 

@@ -12,7 +12,7 @@ import numpy as np
 from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import robust_covariance
-from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled
+from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled, strain
 from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
 from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
@@ -266,8 +266,7 @@ def _against(bench: Bench, found: Fit, like: Fit) -> float:
     """What data and priors have against a fit, in units of an independent sample of what ``like`` leaves."""
     rest = bench.stacked(bench.residuals(like.predictions))
     power = bench.sample_power(rest)
-    far = [(t - free.none) / free.prior for t, free in zip(found.theta, found.frees, strict=True)]
-    return bench.power(found.predictions) / power + float(np.sum(np.square(far)))
+    return bench.power(found.predictions) / power + strain(found)
 
 
 def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:

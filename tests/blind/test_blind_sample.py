@@ -29,3 +29,15 @@ def test_blind(key):
     assert all(len(row) == 6 and row[3] <= row[4] for row in line["numbers"])
     # What ideal sensors read stays with the judge.
     assert "ideal" not in line["verdict"]
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_play_that_is_taken_up_by_another_law_leaves_the_base_as_it_was_given():
+    """The plain formula bends the first stiffness to 0.6 of what it is, and closes 75 % of the gap."""
+    line = attempt(task_of("numpy/effect/output_backlash/2/20"))
+    (play,) = line["verdict"]["effects"]
+    assert play["name"] == "output_backlash"
+    stiffness = line["verdict"]["parameters"]["drive.torsion.stiffness_k1_nm_per_rad"]
+    assert stiffness["value"] == pytest.approx(stiffness["start"], rel=0.1)
+    assert line["closed"] > 0.9

@@ -8,7 +8,7 @@ import pytest
 from diagnose_bench import servo_with_arm
 
 import hdsim
-from hdsim.diagnosis.finer import refined
+from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
@@ -34,8 +34,10 @@ def scenario(mesh: dict[str, Any], effects: dict[str, Any]) -> Scenario:
     return servo_with_arm(mesh, effects, frequency_hz=0.5, teeth_rate_hz=0.0)
 
 
-def with_play(mesh: dict[str, Any], effects: dict[str, Any]) -> tuple[Bench, Fit, Fit]:
-    """A log of a drive, the lumped base re-fitted to it, and that with a plain play."""
+def with_play(
+    mesh: dict[str, Any], effects: dict[str, Any], label: str = "", beside: tuple[str, ...] = ()
+) -> tuple[Bench, Fit, Fit]:
+    """A log of a drive, the lumped base re-fitted to it, and that with a plain play and others beside it."""
     run = hdsim.simulate(scenario(mesh, effects))
     rng = np.random.default_rng(0)
     # How the load swings in before it is driven, nobody could know from the log.
@@ -45,10 +47,11 @@ def with_play(mesh: dict[str, Any], effects: dict[str, Any]) -> tuple[Bench, Fit
     base = scenario(LUMPED, {})
     bench = bench_for([Record("r", time, channels)], [], base, None)
     found = refit(bench, state_of(base)).fit
-    plain = next(f for f in catalogue()[PLAY].fittings if f.play and not f.label)
-    (added,) = starts(PLAY, plain, (), bench.ranges(found.state))
+    plain = next(f for f in catalogue()[PLAY].fittings if f.play and f.label == label)
+    added, *_ = starts(PLAY, plain, (), bench.ranges(found.state))
     added = replace(added, coefficients=(0.5 / added.settings()["backlash_arcmin"],))
-    state = replace(found.state, added=(added,))
+    others = [starts(one, catalogue()[one].fittings[0], (), {})[0] for one in beside]
+    state = replace(found.state, added=(added, *others))
     one = fit(bench, state, at_present(found), prune=False, after=found, evaluations=20, rough=True)
     return bench, found, together(bench, one, rough=True)
 
@@ -89,3 +92,25 @@ def test_a_sharp_play_stays_as_it_is() -> None:
     bench, base, plain = with_play(LUMPED, {PLAY: {"backlash_arcmin": 1.0}})
     assert beyond(bench, plain) < 0.2
     assert refined(bench, base, plain, lambda _: None) is plain
+
+
+@pytest.mark.slow
+def test_gaps_that_differ_are_told_where_their_waves_are_none() -> None:
+    gaps = {"backlash_arcmin": 1.2, "gap_spread": 0.9, "uptake_torque_nm": 8.0}
+    bench, base, plain = with_play(LUMPED, {PLAY: gaps}, label="taken up gradually")
+    found = refined(bench, base, plain, lambda _: None)
+    assert beyond(bench, plain) > 2.0
+    assert beyond(bench, found) < 0.1
+    assert found.state.added[0].fitting.label == "of gaps that differ"
+    assert found.state.added[0].settings()["gap_spread"] == pytest.approx(0.9, abs=0.05)
+
+
+@pytest.mark.slow
+def test_a_play_beside_another_effect_is_refined_though_it_is_not_the_newest() -> None:
+    other = "load_side_friction"
+    bench, base, plain = with_play(LUMPED, {PLAY: MANY, other: {"coulomb_nm": 3.0}}, beside=(other,))
+    found = each_refined(bench, base, plain, lambda _: None)
+    assert [one.effect for one in plain.state.added] == [PLAY, other]
+    assert [one.effect for one in found.state.added] == [PLAY, other]
+    assert [one.fitting.label for one in found.state.added] == ["of many teeth", ""]
+    assert beyond(bench, found) < 0.1 < 1.0 < beyond(bench, plain)
