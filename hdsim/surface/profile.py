@@ -113,9 +113,22 @@ def _waves(places: bytes, frequencies: int, gamma: float) -> tuple[Array, Array]
 
     Kept: drives that differ in their phases alone share them.
     """
-    angle = 2.0 * math.pi * gamma ** np.arange(frequencies)[:, None] * np.frombuffer(places)
+    half = _turned(math.pi * gamma ** np.arange(frequencies), np.frombuffer(places))
     # As 2 sin^2(w x / 2), so that small heights near x = 0 don't cancel.
-    risen, sines = 2.0 * np.sin(angle / 2.0) ** 2, np.sin(angle)
+    risen, sines = 2.0 * half.imag**2, 2.0 * half.imag * half.real
     risen.setflags(write=False)
     sines.setflags(write=False)
     return risen, sines
+
+
+def _turned(rates: Array, x: Array) -> NDArray[np.complex128]:
+    """exp(i rate x), shape (rates, points); of evenly spaced places by products of a few of them."""
+    points, step = len(x), (x[-1] - x[0]) / max(len(x) - 1, 1)
+    even = x[0] + step * np.arange(points)
+    if points < 16 or np.max(np.abs(x - even)) > 4.0 * np.finfo(float).eps * np.max(np.abs(x)):
+        angle = rates[:, None] * x
+        return np.asarray(np.cos(angle) + 1j * np.sin(angle))
+    stride = math.isqrt(points)
+    starts = x[0] + step * stride * np.arange(-(-points // stride))
+    far, near = (np.exp(1j * rates[:, None] * part) for part in (starts, step * np.arange(stride)))
+    return np.asarray((far[:, :, None] * near[:, None, :]).reshape(len(rates), -1)[:, :points])

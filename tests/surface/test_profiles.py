@@ -77,3 +77,14 @@ def test_what_is_no_profile_is_refused():
         arguments = {"x_m": X, "D": 2.5, "G_m": 1e-10, "phases": phases} | change
         with pytest.raises(InputError):
             wm_profile(**arguments)
+
+
+@pytest.mark.parametrize(("first", "points"), [(0.0, 4001), (2.0e-4, 17), (-3.0e-4, 400), (0.0, 1)])
+@pytest.mark.parametrize("bent", [0.0, 1e-9])
+def test_evenly_spaced_places_have_the_heights_of_any_others(first, points, bent):
+    x = first + 1.3e-6 * np.arange(points)
+    x = x + bent * np.sin(np.arange(points))
+    phases = random_phases(1, 1)[0]
+    expected = literal_sum(x, 2.4, 1e-10, phases)
+    found = wm_profile(x, 2.4, 1e-10, phases=phases, length_m=L)
+    np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
