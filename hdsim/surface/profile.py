@@ -113,7 +113,8 @@ def _waves(places: bytes, frequencies: int, gamma: float) -> tuple[Array, Array]
 
     Kept: drives that differ in their phases alone share them.
     """
-    half = _turned(math.pi * gamma ** np.arange(frequencies), np.frombuffer(places))
+    rates = np.asarray(math.pi * gamma ** np.arange(frequencies))
+    half = _turned(rates, np.frombuffer(places))
     # As 2 sin^2(w x / 2), so that small heights near x = 0 don't cancel.
     risen, sines = 2.0 * half.imag**2, 2.0 * half.imag * half.real
     risen.setflags(write=False)
