@@ -68,7 +68,8 @@ def again(
             break
         own, added = names[k], current.state.added
         rest = without(bench, current, k)
-        if rest is None:
+        if rest is None or bench.power(rest.predictions) > (1.0 + NEWS) * bench.power(base.predictions):
+            # More than with no effect at all: the fit has failed.
             k += 1
             continue
         left = left_of(bench, rest)

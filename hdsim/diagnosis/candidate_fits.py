@@ -31,6 +31,8 @@ FARTHEST = 2.0
 SOFTEST = 0.85
 #: Part of the screen's coefficient at which a compliance's fit, or one that led astray, begins a second time.
 SMALL = 0.2
+#: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
+FAR = 0.7
 #: Most times that a fit from another minimum is carried on, and part by which what it leaves must have fallen
 #: at a time: the way there is a bent valley.
 FARTHER, STALLED = 6, 0.01
@@ -66,6 +68,19 @@ def point_at(bench: Bench, base: Fit, theta: Array) -> Point:
         theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
         bench.stacked(bench.residuals(predictions)),
     )  # fmt: skip
+
+
+def as_given(bench: Bench, found: Fit) -> Fit | None:
+    """A fit's model with the base's numbers as they were given; None where none of them has gone far."""
+    frees = at_present(found)
+    theta = np.array([0.0 if free.step else free.none for free in frees])
+    if not np.any(np.abs(theta) > FAR):
+        return None
+    point = point_at(bench, found, theta)
+    moved = [free.moved(float(t)) for free, t in zip(frees, theta, strict=True)]
+    there, columns = list(point.predictions), point.columns
+    none = np.zeros(len(moved))
+    return replace(found, state=point.state, frees=moved, theta=none, predictions=there, columns=columns)
 
 
 def fits_from(bench: Bench, base: Fit, given: Point, added: Added) -> list[Fit]:

@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from hdsim.diagnosis.candidate_fits import (
+    FAR,
     Point,
     fits_at_next_minima,
     fits_from,
@@ -31,8 +32,6 @@ from hdsim.estimate.refit import REACHED
 LEFT_IN, FAR_LEFT_IN = 2.0, 3.0
 #: Most candidates that are.
 FAR_MOST = 3
-#: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
-FAR = 0.7
 #: Part by which a law of compliance must leave more than the best of them to be fitted from there too.
 LAGS = 0.1
 

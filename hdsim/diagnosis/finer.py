@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS
-from hdsim.diagnosis.contest import FAR
+from hdsim.diagnosis.candidate_fits import FAR
 from hdsim.diagnosis.revise import EXCESS
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue

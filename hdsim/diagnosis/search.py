@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
+from hdsim.diagnosis.candidate_fits import as_given
 from hdsim.diagnosis.contest import Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
@@ -27,8 +28,8 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
-from hdsim.estimate.orders import Line, power_of
-from hdsim.estimate.refit import align, reweigh, together, with_delays
+from hdsim.estimate.orders import Line, order_lines, power_of
+from hdsim.estimate.refit import align, reweigh, together, unlikelihood, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
@@ -207,6 +208,8 @@ def _one_more(
     tell = during("fit", "fitting the shortlist")
     coordinate = places[0].coordinate if places else ""
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell, fitted=fitted)
+    if not found.named:
+        named = _over_the_given(bench, current, stage, named, during)
     if named is None:
         return None
     change = left.project(bench.trace(current.predictions, named.fit.predictions))
@@ -222,6 +225,36 @@ def _one_more(
         return named
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
     return named if named.gain >= least else None
+
+
+def _over_the_given(
+    bench: Bench, base: Fit, stage: Stage, named: Named | None, during: Callable[[str, str], Step]
+) -> Named | None:
+    """The first effect, or the one that is named over the base's numbers as given where that is likelier.
+
+    A re-fit may bend the base far to stand in for a part of what is missing, and what is left then is no
+    trace of it any more.
+    """
+    given = as_given(bench, base)
+    if given is None or stage.screening is None:
+        return named
+    left = left_of(bench, given)
+    residuals = bench.residuals(given.predictions, drift=True)
+    lines = [line for channel in bench.channels for line in order_lines(bench, residuals, channel)]
+    tell = during("screen", "screening the catalogue over the model as given")
+    screening = screen(bench, given.state, left, lines, on_step=tell)
+    if not screening.ranked or screening.chance > LEVEL:
+        return named
+    tell = during("fit", "fitting the shortlist from the model as given")
+    other = name_effect(bench, given, screening, left, on_step=tell)
+    if other is None:
+        return named
+    if named is not None and unlikelihood(bench, named.fit, other.fit) <= unlikelihood(
+        bench, other.fit, other.fit
+    ):
+        return named
+    stage.screening = screening
+    return other
 
 
 def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:

@@ -249,7 +249,7 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
     whole = fit(bench, state or found.state, frees, after=readings, rough=rough)
     if far and bench.power(whole.predictions) > REACHED * sum(bench.noise_powers.values()):
         other = fit(bench, state or found.state, frees, theta=far, after=readings, rough=rough)
-        whole = min(whole, other, key=lambda each: _against(bench, each, whole))
+        whole = min(whole, other, key=lambda each: unlikelihood(bench, each, whole))
     if rough:
         return whole
     left = [free for free in whole.undetermined if not free.reading]
@@ -262,7 +262,7 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
     return whole
 
 
-def _against(bench: Bench, found: Fit, like: Fit) -> float:
+def unlikelihood(bench: Bench, found: Fit, like: Fit) -> float:
     """What data and priors have against a fit, in units of an independent sample of what ``like`` leaves."""
     rest = bench.stacked(bench.residuals(like.predictions))
     power = bench.sample_power(rest)
