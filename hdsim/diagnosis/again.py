@@ -12,7 +12,7 @@ from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, screen
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
-from hdsim.estimate.orders import Line, order_lines
+from hdsim.estimate.orders import Line, lines_of
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added
 from hdsim.estimate.unwound import unwound
@@ -73,11 +73,7 @@ def again(
             k += 1
             continue
         left = left_of(bench, rest)
-        peaks: list[Line] = []
-        residuals = bench.residuals(rest.predictions, drift=True)
-        for channel in bench.channels:
-            age_s = rest.state.delays.get(channel, 0.0)
-            peaks += order_lines(bench, residuals, channel, age_s=age_s)
+        peaks = lines_of(bench, bench.residuals(rest.predictions, drift=True), rest.state.delays)
         tell(f"{own.name} again")
         done = instead(one for one in names if one is not own)
         screening = screen(bench, rest.state, left, peaks, before=before, leave_out=done)

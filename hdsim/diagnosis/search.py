@@ -28,7 +28,7 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
-from hdsim.estimate.orders import Line, order_lines, power_of
+from hdsim.estimate.orders import Line, lines_of, power_of
 from hdsim.estimate.refit import align, reweigh, together, unlikelihood, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 
@@ -239,8 +239,7 @@ def _over_the_given(
     if given is None or stage.screening is None:
         return named
     left = left_of(bench, given)
-    residuals = bench.residuals(given.predictions, drift=True)
-    lines = [line for channel in bench.channels for line in order_lines(bench, residuals, channel)]
+    lines = lines_of(bench, bench.residuals(given.predictions, drift=True), given.state.delays)
     tell = during("screen", "screening the catalogue over the model as given")
     screening = screen(bench, given.state, left, lines, on_step=tell)
     if not screening.ranked or screening.chance > LEVEL:
@@ -249,10 +248,10 @@ def _over_the_given(
     other = name_effect(bench, given, screening, left, on_step=tell)
     if other is None:
         return named
-    if named is not None and unlikelihood(bench, named.fit, other.fit) <= unlikelihood(
-        bench, other.fit, other.fit
-    ):
-        return named
+    if named is not None:
+        own, from_given = (unlikelihood(bench, each.fit, other.fit) for each in (named, other))
+        if own <= from_given:
+            return named
     stage.screening = screening
     return other
 

@@ -81,6 +81,15 @@ def order_lines(
     return sorted(lines, key=lambda line: -line.share)
 
 
+def lines_of(bench: Bench, residuals: Sequence[Array], delays: Mapping[str, float]) -> list[Line]:
+    """Strongest orders of every compared channel, as in ``order_lines``; the channels' delays by name, s."""
+    return [
+        line
+        for channel in bench.channels
+        for line in order_lines(bench, residuals, channel, age_s=delays.get(channel, 0.0))
+    ]
+
+
 @dataclass(frozen=True)
 class OverAngle:
     """A channel's residual over the motor's angle, shape (n,) each; of many samples a part.

@@ -13,7 +13,7 @@ from hdsim.diagnosis.contest import contest
 from hdsim.diagnosis.traces import screen
 from hdsim.estimate.fit import sharpened
 from hdsim.estimate.opening import bench_for
-from hdsim.estimate.orders import order_lines
+from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import state_of
 
@@ -41,8 +41,7 @@ def opened(tmp_path_factory):
 
 def candidate(bench, fit, name):
     left, residuals = left_of(bench, fit), bench.residuals(fit.predictions)
-    lines = [line for channel in bench.channels for line in order_lines(bench, residuals, channel)]
-    screening = screen(bench, fit.state, left, lines)
+    screening = screen(bench, fit.state, left, lines_of(bench, residuals, fit.state.delays))
     return left, next(one for one in screening.ranked if one.name == name)
 
 

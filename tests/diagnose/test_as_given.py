@@ -1,0 +1,54 @@
+"""The model as it was given, beside one that a re-fit has bent: where the first effect is asked for again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnose_bench import rigid_record, scenario
+
+from hdsim.diagnosis.candidate_fits import as_given
+from hdsim.estimate.fit import at_present
+from hdsim.estimate.numbers import scaled
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.refit import refit
+from hdsim.estimate.state import number_at, state_of
+
+INERTIA = "drive.inertia.motor_kg_m2"
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    base = scenario(tmp_path_factory.mktemp("bench"), "rigid")
+    bench = bench_for([rigid_record()], [], base, None)
+    return bench, refit(bench, state_of(base)).fit
+
+
+def bent(bench, found, factor):
+    """The fit with the motor's inertia that many times as large."""
+    frees = at_present(found)
+    theta = np.array([math.log(factor) if free.name == INERTIA else 0.0 for free in frees])
+    state = scaled(found.state, frees, theta.tolist())
+    return replace(found, state=state, frees=frees, theta=theta, predictions=bench.predict(state))
+
+
+def test_a_model_that_has_not_gone_far_is_asked_once(fitted):
+    bench, found = fitted
+    assert as_given(bench, found) is None
+    assert as_given(bench, bent(bench, found, 1.8)) is None
+
+
+@pytest.mark.parametrize("factor", [0.4, 5.0])
+def test_a_bent_model_goes_back_to_what_was_given_and_is_free_there(fitted, factor):
+    bench, found = fitted
+    given = as_given(bench, bent(bench, found, factor))
+    assert number_at(given.state, INERTIA) == pytest.approx(5.0e-5)
+    assert not given.theta.any()
+    assert all(free.none == pytest.approx(0.0, abs=1e-12) for free in given.frees if not free.step)
+    for free in given.frees:
+        assert free.value == pytest.approx(number_at(given.state, free.paths[0])) if free.paths else True
+    for own, others in zip(given.predictions, bench.predict(given.state), strict=True):
+        np.testing.assert_array_equal(own, others)
+    assert given.columns.shape == found.columns.shape
