@@ -46,7 +46,7 @@ def test_a_play_that_is_taken_up_by_another_law_leaves_the_base_as_it_was_given(
 @pytest.mark.slow
 @pytest.mark.study
 def test_a_tooth_is_named_though_a_re_fit_bends_the_base_until_no_trace_of_it_is_left():
-    """The motor alone tells of it; the re-fit makes the load's inertia a fifth, the motor's three times it."""
+    """The motor alone tells of it; the re-fit makes the load's inertia a fifth, the motor's three times."""
     line = attempt(task_of("numpy/effect/damaged_tooth/0/22"))
     assert outcome(line) == "right"
     assert line["closed"] > 0.8
