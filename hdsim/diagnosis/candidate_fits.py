@@ -70,14 +70,21 @@ def point_at(bench: Bench, base: Fit, theta: Array) -> Point:
     )  # fmt: skip
 
 
+def to_the_given(found: Fit) -> Array:
+    """Logarithms that lead the base's numbers back to what was given, shape (f,): 0 for delays.
+
+    Whatever a fit began from; a delay is no model's.
+    """
+    return np.array([0.0 if free.step else free.none for free in at_present(found)])
+
+
 def as_given(bench: Bench, found: Fit) -> Fit | None:
     """A fit's model with the base's numbers as they were given; None where none of them has gone far."""
-    frees = at_present(found)
-    theta = np.array([0.0 if free.step else free.none for free in frees])
+    theta = to_the_given(found)
     if not np.any(np.abs(theta) > FAR):
         return None
     point = point_at(bench, found, theta)
-    moved = [free.moved(float(t)) for free, t in zip(frees, theta, strict=True)]
+    moved = [free.moved(float(t)) for free, t in zip(at_present(found), theta, strict=True)]
     there, columns = list(point.predictions), point.columns
     none = np.zeros(len(moved))
     return replace(found, state=point.state, frees=moved, theta=none, predictions=there, columns=columns)

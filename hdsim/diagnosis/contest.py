@@ -18,6 +18,7 @@ from hdsim.diagnosis.candidate_fits import (
     full_fits,
     point_at,
     rough_fits,
+    to_the_given,
 )
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, designs
@@ -89,9 +90,10 @@ def contest(
         return []
     noise = sum(bench.noise_powers.values())
     least = min(loss for loss, _ in best.values())
-    if any(abs(t) > FAR for t in base.theta) and least > REACHED * noise:
+    back = to_the_given(base)
+    if np.any(np.abs(back) > FAR) and least > REACHED * noise:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            given = point_at(bench, base, -base.theta)
+            given = point_at(bench, base, back)
             nearest = sorted(best, key=lambda name: best[name][0])[:FAR_MOST]
             nearest = [name for name in nearest if best[name][0] <= FAR_LEFT_IN * least]
             for one in shortlist:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS
-from hdsim.diagnosis.candidate_fits import FAR
+from hdsim.diagnosis.candidate_fits import FAR, to_the_given
 from hdsim.diagnosis.revise import EXCESS
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
@@ -53,11 +53,11 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
     tell(f"fitting a finer {plain.effect}")
     with bench.coarse():
         ends = [_at_its_end(bench, current, [*others, one]) for one in begins]
-        frees = at_present(current)
+        back = to_the_given(current)
         # A plain formula may have bent the base to stand in for what it lacks.
-        if any(abs(free.none) > FAR for free in frees if not free.step):
-            as_given = {free.name: free.none for free in frees}
-            ends += [_at_its_end(bench, current, [*others, one], as_given) for one in begins]
+        if np.any(np.abs(back) > FAR):
+            given = {free.name: float(t) for free, t in zip(current.frees, back, strict=True)}
+            ends += [_at_its_end(bench, current, [*others, one], given) for one in begins]
         # The plain one may not have been at its end.
         as_it_is = _at_its_end(bench, current, [*others, plain])
     plain_end = as_it_is or current

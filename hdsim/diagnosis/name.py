@@ -16,7 +16,7 @@ from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, Screening
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit
+from hdsim.estimate.fit import Fit, at_present
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import REACHED
 
@@ -122,7 +122,7 @@ def name_effect(
 
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
     shortlist = [one for one in shortlist if _could_win(one, best)][:SHORTLIST]
-    softer = any(free.compliance and t < -SOFTER for free, t in zip(base.frees, base.theta, strict=True))
+    softer = any(free.compliance and free.none > SOFTER for free in at_present(base))
     series = [one for one in screening.ranked if one.added.fitting.in_series]
     if softer and any(
         one in series or any(confusable(one.name, other.name) for other in series) for one in shortlist

@@ -36,7 +36,7 @@ FITTING = 4.0
 class Screened:
     """An effect on the screen: the fitting of it that explains most, and its trace, shape (rows, k).
 
-    ``others`` are fittings of other kinds that explain nearly as much.
+    ``others`` are fittings of other kinds that explain nearly as much, or are in series with the drive's own.
     """
 
     name: str
@@ -175,7 +175,9 @@ def screen(
     best: dict[str, Screened] = {}
     for one in sorted(kinds.values(), key=lambda one: -one.share.share):
         first = best.setdefault(one.name, one)
-        if one is not first and one.share.share >= KINDRED * first.share.share:
+        # Of a compliance the base's own may have taken all that a screen could show.
+        kindred = one.share.share >= KINDRED * first.share.share or one.added.fitting.in_series
+        if one is not first and kindred:
             first.others.append(one)
     for name in catalogue():
         if name not in best:
