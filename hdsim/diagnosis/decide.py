@@ -95,6 +95,12 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
         ("what is left, in units of the noise", times, rules.rest, times > rules.rest),
     ):
         because.append(Reason(rule=rule, seen=seen, limit=limit, holds=holds))
+    if rest is not None:
+        # Means of many readings show structure that is less than what counts as an effect.
+        excess = times**2 - 1.0
+        structured = structured and excess >= rules.excess
+        rule, limit, holds = "excess over the noise of a reading", rules.excess, excess >= rules.excess
+        because.append(Reason(rule=rule, seen=excess, limit=limit, holds=holds))
     if structured or times > rules.rest:
         certainty = (1.0 - max(confidence, default=0.0)) * rules.unknown
         return Decision(kind="unknown", confidence=confidence, certainty=certainty, because=because)

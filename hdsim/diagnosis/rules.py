@@ -72,6 +72,12 @@ class Rules(Part):
         "least part of what is left that must be structure to count",
         "blind seeds 100-502 of the first matrix",
     )
+    excess: float = _rule(
+        0.05,
+        "times the noise power of a reading",
+        "least excess of the noisiest channel for structure to count",
+        "chosen: half of the root mean square of the weakest effects of blind cases",
+    )
     rest: float = _rule(1.6, "times the noise", "what may be left without being called unknown", "chosen")
     unknown: float = _rule(
         0.85, "probability", "that what no effect explains is in none of the catalogue's laws", "chosen"

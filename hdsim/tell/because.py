@@ -57,6 +57,9 @@ WORDINGS = {
     "what is left, in units of the noise": Wording(
         "residual of the worst channel, relative to its noise", times, "more than"
     ),
+    "excess over the noise of a reading": Wording(
+        "power of the worst channel's residual beyond the noise of a single reading", _part, "at least"
+    ),
     "the re-fit closes a held-out gap": Wording(
         "reduction of a held-out residual by the re-fit", _part, "at least"
     ),

@@ -165,3 +165,10 @@ def test_an_effect_with_which_held_out_data_are_predicted_worse_is_none():
     assert decide(worse).kind == "unknown"
     blunt = found(law(), explained=0.97, held=HeldOutEvidence(slope=0.29, spread=0.5))
     assert decide(blunt).kind == "effect"
+
+
+@pytest.mark.parametrize(("times_noise", "kind"), [(1.018, "nothing"), (1.1, "unknown")])
+def test_structure_that_only_means_of_many_readings_show_is_nothing_that_is_missing(times_noise, kind):
+    """A drive without an effect against a locked output: 12 % of what the means of four readings leave."""
+    rest = RestEvidence(record="a", channel="b", times_noise=times_noise)
+    assert decide(Evidence(left=0.1204, left_chance=0.0025, rest=rest)).kind == kind

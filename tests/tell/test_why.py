@@ -104,8 +104,8 @@ def test_bars_point_to_the_side_that_the_evidence_speaks_for(tmp_path):
 def test_a_limit_is_met_by_its_own_numbers_not_by_what_it_speaks_for():
     # Both must be met for a pattern; the chance alone is.
     evidence = NOTHING.model_copy(update={"left_chance": 0.001, "left": 0.05})
-    chance, part, noise, fall = conditions(decide(evidence).because)
-    assert (chance.met, part.met, noise.met, fall.met) == (True, False, False, False)
+    chance, part, noise, excess, fall = conditions(decide(evidence).because)
+    assert (chance.met, part.met, noise.met, excess.met, fall.met) == (True, False, False, False, False)
     assert chance.limit == "at most 2\u00a0%"
     assert part.limit == "at least 12\u00a0%"
 
