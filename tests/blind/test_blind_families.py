@@ -174,7 +174,7 @@ def check_case(case: Case, family: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [1, 3, pytest.param(7, marks=pytest.mark.study)])
+@pytest.mark.parametrize("number", [1, *(pytest.param(n, marks=pytest.mark.study) for n in (3, 7))])
 def test_a_mujoco_case_follows_from_number_and_seed(mujoco_family, number):
     first, again = mujoco_family.draw(number, 0), mujoco_family.draw(number, 0)
     check_case(first, "mujoco")

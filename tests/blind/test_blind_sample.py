@@ -10,7 +10,7 @@ from running import attempt, stored, task_of
 SAMPLE = (
     pytest.param("numpy/parameter/-/3/0", marks=pytest.mark.study),
     "numpy/effect/-/4/0",
-    "numpy/null/-/7/0",
+    pytest.param("numpy/null/-/7/0", marks=pytest.mark.study),
 )
 
 

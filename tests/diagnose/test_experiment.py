@@ -115,7 +115,10 @@ def test_an_encoders_eccentricity_is_told_from_the_members_by_turning_the_encode
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("truth", ["torsional_hysteresis_duhem", "torsional_hysteresis_maxwell"])
+@pytest.mark.parametrize(
+    "truth",
+    ["torsional_hysteresis_duhem", pytest.param("torsional_hysteresis_maxwell", marks=pytest.mark.study)],
+)
 def test_two_laws_of_hysteresis_are_told_apart_better_than_by_the_record(tmp_path, truth):
     base = base_of(tmp_path)
     duhem = {"stiffness_nm_per_rad": 1e4, "saturation_torque_nm": 1.0}
