@@ -25,6 +25,8 @@ GAMMA = 1.5
 SAMPLING_LENGTH_M = 2.1e-3
 #: Index of the highest frequency of the full sum at which it reproduces Table 4.
 HIGHEST_INDEX = 25
+#: Places up to which each is computed by itself.
+FEW = 16
 
 
 def random_phases(
@@ -124,12 +126,13 @@ def _waves(places: bytes, frequencies: int, gamma: float) -> tuple[Array, Array]
 
 def _turned(rates: Array, x: Array) -> NDArray[np.complex128]:
     """exp(i rate x), shape (rates, points); of evenly spaced places by products of a few of them."""
-    points, step = len(x), (x[-1] - x[0]) / max(len(x) - 1, 1)
-    even = x[0] + step * np.arange(points)
-    if points < 16 or np.max(np.abs(x - even)) > 4.0 * np.finfo(float).eps * np.max(np.abs(x)):
+    points = len(x)
+    step = (x[-1] - x[0]) / (points - 1) if points > FEW else math.nan
+    even = x[:1] + step * np.arange(points)
+    if not np.all(np.abs(x - even) <= 4.0 * np.finfo(float).eps * np.max(np.abs(x), initial=0.0)):
         angle = rates[:, None] * x
         return np.asarray(np.cos(angle) + 1j * np.sin(angle))
-    stride = math.isqrt(points)
-    starts = x[0] + step * stride * np.arange(-(-points // stride))
+    stride = max(math.isqrt(points), 1)
+    starts = x[:1] + step * stride * np.arange(-(-points // stride))
     far, near = (np.exp(1j * rates[:, None] * part) for part in (starts, step * np.arange(stride)))
     return np.asarray((far[:, :, None] * near[:, None, :]).reshape(len(rates), -1)[:, :points])

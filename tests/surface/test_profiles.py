@@ -88,3 +88,7 @@ def test_evenly_spaced_places_have_the_heights_of_any_others(first, points, bent
     expected = literal_sum(x, 2.4, 1e-10, phases)
     found = wm_profile(x, 2.4, 1e-10, phases=phases, length_m=L)
     np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+
+
+def test_no_places_have_no_heights():
+    assert wm_profile([], 2.4, 1e-10, phases=random_phases(2, 1)).shape == (2, 0)
