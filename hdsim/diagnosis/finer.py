@@ -12,14 +12,15 @@ base's numbers as given, too.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS
-from hdsim.diagnosis.candidate_fits import FAR, to_the_given
+from hdsim.diagnosis.candidate_fits import as_given
 from hdsim.diagnosis.revise import EXCESS
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
@@ -52,12 +53,11 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
         return current
     tell(f"fitting a finer {plain.effect}")
     with bench.coarse():
-        ends = [_at_its_end(bench, current, [*others, one]) for one in begins]
-        back = to_the_given(current)
-        # A plain formula may have bent the base to stand in for what it lacks.
-        if np.any(np.abs(back) > FAR):
-            given = {free.name: float(t) for free, t in zip(current.frees, back, strict=True)}
-            ends += [_at_its_end(bench, current, [*others, one], given) for one in begins]
+        ends = [_at_its_end(bench, current, [*others, one]) for one in _nearest(bench, current, begins)]
+        given = as_given(bench, current)
+        if given is not None:
+            # A plain formula may have bent the base to stand in for what it lacks.
+            ends += [_at_its_end(bench, given, [*others, one]) for one in _nearest(bench, given, begins)]
         # The plain one may not have been at its end.
         as_it_is = _at_its_end(bench, current, [*others, plain])
     plain_end = as_it_is or current
@@ -109,6 +109,22 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
             yield replace(one, coefficients=tuple(coefficients))
 
 
+def _nearest(bench: Bench, current: Fit, begins: Sequence[Added]) -> list[Added]:
+    """Of the starts of a formula's last shape the one that leaves least before anything is fitted.
+
+    A play that is too sharp rattles where the true one does not, and no slope leads away from there.
+    """
+    *others, _ = current.state.added
+    predicted = bench.predict_all([replace(current.state, added=(*others, one)) for one in begins])
+    least: dict[tuple[str, tuple[float, ...]], tuple[float, Added]] = {}
+    for one, there in zip(begins, predicted, strict=True):
+        power = math.inf if there is None else bench.power(there)
+        way = one.fitting.label, one.shapes[:-1]
+        if way not in least or power < least[way][0]:
+            least[way] = power, one
+    return [one for _, one in least.values()]
+
+
 def _known(term: Any, settings: dict[str, Any]) -> float:
     """Coefficient of a term that gives its fields the sizes that they have, 0 for fields without one."""
     if isinstance(term, Amplitude):
@@ -118,11 +134,9 @@ def _known(term: Any, settings: dict[str, Any]) -> float:
     return 0.0
 
 
-def _at_its_end(
-    bench: Bench, current: Fit, added: list[Added], theta: Mapping[str, float] | None = None
-) -> Fit | None:
+def _at_its_end(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
     """All numbers fitted from where they are, with these effects, as far as that leads; None if nowhere."""
-    found = _fitted(bench, current, added, theta)
+    found = _fitted(bench, current, added)
     for _ in range(TIMES):
         further = None if found is None else _fitted(bench, found, list(found.state.added))
         if found is None or further is None:
@@ -133,19 +147,10 @@ def _at_its_end(
     return found
 
 
-def _fitted(
-    bench: Bench, current: Fit, added: list[Added], theta: Mapping[str, float] | None = None
-) -> Fit | None:
+def _fitted(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
     state = replace(current.state, added=tuple(added))
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         return fit(
-            bench,
-            state,
-            at_present(current),
-            prune=False,
-            evaluations=EVALUATIONS,
-            theta=theta,
-            after=current,
-            rough=True,
+            bench, state, at_present(current), prune=False, evaluations=EVALUATIONS, after=current, rough=True
         )
     return None

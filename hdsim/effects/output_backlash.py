@@ -99,7 +99,7 @@ class OutputBacklash(Effect):
             ),
             (
                 Shape("uptake_torque_nm", (0.03, 0.2), of_range="torque_nm", most=1.0),
-                Shape("gap_spread", (0.4,), linear=True),
+                Shape("gap_spread", (0.4, 0.9), linear=True),
             ),
             settings={"components": [{"order": order, "amplitude_arcmin": 0.0} for order in orders]},
             label=label,
