@@ -16,6 +16,8 @@ UNDETERMINED = 0.5
 #: Least share in the weakest direction that makes a number a tie, and least size of a number's own effect, in
 #: standard deviations of the data at its prior spread, for it to be tied rather than unseen.
 SHARE, SEEN = 0.3, 2.0
+#: Part by which spreads that are the same may differ.
+EVEN = 1e-6
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,8 @@ def determined(
         scaled = columns[:, use] * priors[use] / math.sqrt(power)
         _, singular, directions = np.linalg.svd(np.linalg.qr(scaled, mode="r"))
         spread = (directions**2 / (1.0 + singular[:, None] ** 2)).sum(axis=0)[: len(kept)]
-        worst = int(np.argmax(spread))
+        # Two that do the same are told apart by rounding alone: the later one goes, on any processor.
+        worst = int(np.flatnonzero(spread >= (1.0 - EVEN) * spread.max())[-1])
         if math.sqrt(spread[worst]) <= UNDETERMINED:
             break
         weakest = directions[-1]
