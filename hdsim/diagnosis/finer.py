@@ -15,7 +15,6 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -24,14 +23,13 @@ from hdsim.diagnosis.candidate_fits import as_given
 from hdsim.diagnosis.revise import EXCESS
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Amplitude, Fitting
+from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import sample_power, worth_of_a_number
 from hdsim.estimate.fit import Fit, at_present, fit, sharpened, strain
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import REACHED
 from hdsim.estimate.state import Added
-from hdsim.nested import at
 
 #: Evaluations of a fit, and most times that it is carried on.
 EVALUATIONS, TIMES = 14, 2
@@ -105,7 +103,7 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
         for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
             coefficients: list[float] = []
             for term, part in one.fitting.parts(()):
-                coefficients += [_known(term, plain.settings())] * (part.stop - part.start)
+                coefficients += [term.read(plain.settings())] * (part.stop - part.start)
             yield replace(one, coefficients=tuple(coefficients))
 
 
@@ -123,15 +121,6 @@ def _nearest(bench: Bench, current: Fit, begins: Sequence[Added]) -> list[Added]
         if way not in least or power < least[way][0]:
             least[way] = power, one
     return [one for _, one in least.values()]
-
-
-def _known(term: Any, settings: dict[str, Any]) -> float:
-    """Coefficient of a term that gives its fields the sizes that they have, 0 for fields without one."""
-    if isinstance(term, Amplitude):
-        for path, unit in term.units.items():
-            with contextlib.suppress(KeyError):
-                return float(at(settings, path)) / unit
-    return 0.0
 
 
 def _at_its_end(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from hdsim.nested import put
+from hdsim.nested import at, put
 
 if TYPE_CHECKING:
     import numpy as np
@@ -84,6 +84,10 @@ class Term:
             before: what terms before it gave to each field; added to.
         """
         raise NotImplementedError
+
+    def read(self, data: Settings) -> float:
+        """Coefficient at which its first field is as an effect's settings have it; 0 where they have none."""
+        return 0.0
 
     def at_end(self, c: Values, plausible: Limits) -> bool:
         """Whether a field is as strong as its range allows: what is fitted would rather be something else."""
@@ -160,6 +164,14 @@ class Amplitude(Term):
         for path, unit in self.units.items():
             before[path] = before.get(path, 0.0) + c[0] * unit
             put(data, path, before[path])
+
+    def read(self, data: Settings) -> float:
+        """See ``Term.read``."""
+        path, unit = next(iter(self.units.items()))
+        try:
+            return float(at(data, path)) / unit
+        except LookupError:
+            return 0.0
 
     def at_end(self, c: Values, plausible: Limits) -> bool:
         """At the upper end, or, of a signed one, at the lower."""

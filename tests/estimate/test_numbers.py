@@ -289,3 +289,10 @@ def test_whatever_a_fits_bounds_allow_is_a_legal_effect(name):
             corner = np.where(np.isfinite(ends[:, side]), ends[:, side], (-1e7, 1e7)[side])
             effect = replace(added, coefficients=tuple(np.where(corner == 0.0, 1e-6, corner)))
             catalogue()[name].model_validate(effect.settings())
+
+
+def test_an_amplitude_reads_back_what_it_has_written() -> None:
+    term, data = Amplitude({"a_nm": 0.5, "inner.b": 2.0}), {"inner": {}}
+    term.write(data, [3.0], (), {})
+    assert term.read(data) == 3.0
+    assert term.read({"inner": {"b": 6.0}}) == 0.0
