@@ -52,7 +52,7 @@ class Point:
 
     theta: Array
     state: State
-    predictions: Sequence[Array]
+    predictions: list[Array]
     columns: Array
     left: Array
 
@@ -70,24 +70,28 @@ def point_at(bench: Bench, base: Fit, theta: Array) -> Point:
     )  # fmt: skip
 
 
-def to_the_given(found: Fit) -> Array:
-    """Logarithms that lead the base's numbers back to what was given, shape (f,): 0 for delays.
+def given_point(bench: Bench, found: Fit) -> Point | None:
+    """A fit's model with the base's numbers as given, whatever it began from; delays are no model's and stay.
 
-    Whatever a fit began from; a delay is no model's.
+    None where none of them has gone far, or where nothing can be predicted.
     """
-    return np.array([0.0 if free.step else free.none for free in at_present(found)])
+    theta = np.array([0.0 if free.step else free.none for free in at_present(found)])
+    if np.any(np.abs(theta) > FAR):
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            return point_at(bench, found, theta)
+    return None
 
 
 def as_given(bench: Bench, found: Fit) -> Fit | None:
-    """A fit's model with the base's numbers as they were given; None where none of them has gone far."""
-    theta = to_the_given(found)
-    if not np.any(np.abs(theta) > FAR):
+    """``given_point`` as a fit that has not begun."""
+    there = given_point(bench, found)
+    if there is None:
         return None
-    point = point_at(bench, found, theta)
-    moved = [free.moved(float(t)) for free, t in zip(at_present(found), theta, strict=True)]
-    there, columns = list(point.predictions), point.columns
-    none = np.zeros(len(moved))
-    return replace(found, state=point.state, frees=moved, theta=none, predictions=there, columns=columns)
+    frees = [free.moved(float(t)) for free, t in zip(at_present(found), there.theta, strict=True)]
+    return replace(
+        found, state=there.state, frees=frees, theta=np.zeros(len(frees)), predictions=there.predictions,
+        columns=there.columns,
+    )  # fmt: skip
 
 
 def fits_from(bench: Bench, base: Fit, given: Point, added: Added) -> list[Fit]:

@@ -11,14 +11,13 @@ from itertools import product
 import numpy as np
 
 from hdsim.diagnosis.candidate_fits import (
-    FAR,
     Point,
     fits_at_next_minima,
     fits_from,
     full_fits,
+    given_point,
     point_at,
     rough_fits,
-    to_the_given,
 )
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, designs
@@ -90,10 +89,9 @@ def contest(
         return []
     noise = sum(bench.noise_powers.values())
     least = min(loss for loss, _ in best.values())
-    back = to_the_given(base)
-    if np.any(np.abs(back) > FAR) and least > REACHED * noise:
+    given = given_point(bench, base) if least > REACHED * noise else None
+    if given is not None:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            given = point_at(bench, base, back)
             nearest = sorted(best, key=lambda name: best[name][0])[:FAR_MOST]
             nearest = [name for name in nearest if best[name][0] <= FAR_LEFT_IN * least]
             for one in shortlist:

@@ -98,9 +98,10 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
     if rest is not None:
         # Means of many readings show structure that is less than what counts as an effect.
         excess = times**2 - 1.0
-        structured = structured and excess >= rules.excess
-        rule, limit, holds = "excess over the noise of a reading", rules.excess, excess >= rules.excess
-        because.append(Reason(rule=rule, seen=excess, limit=limit, holds=holds))
+        counts = excess >= rules.excess
+        structured = structured and counts
+        rule = "excess over the noise of a reading"
+        because.append(Reason(rule=rule, seen=excess, limit=rules.excess, holds=counts))
     if structured or times > rules.rest:
         certainty = (1.0 - max(confidence, default=0.0)) * rules.unknown
         return Decision(kind="unknown", confidence=confidence, certainty=certainty, because=because)

@@ -25,10 +25,10 @@ from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.covariance import sample_power, worth_of_a_number
-from hdsim.estimate.fit import Fit, at_present, fit, sharpened, strain
+from hdsim.estimate.covariance import worth_of_a_number
+from hdsim.estimate.fit import Fit, at_present, fit, sharpened
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.refit import REACHED
+from hdsim.estimate.refit import REACHED, unlikelihood
 from hdsim.estimate.state import Added
 
 #: Evaluations of a fit, and most times that it is carried on.
@@ -63,12 +63,11 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
     inside = [found for found in ends if found is not None and not found.state.added[-1].at_limit]
     least = min([plain_end, *inside], key=lambda found: bench.power(found.predictions))
     rest, blocks = bench.stacked(bench.residuals(least.predictions)), bench.stacked_blocks()
-    sample, number = sample_power(rest, blocks), worth_of_a_number(rest, blocks)
+    sample, number = bench.sample_power(rest), worth_of_a_number(rest, blocks)
 
     def cost(found: Fit) -> float:
         """Of the data, of the priors, and of the effect's numbers."""
-        power, freedom = bench.power(found.predictions), found.state.added[-1].freedom
-        return power + sample * strain(found) + number * freedom
+        return sample * unlikelihood(bench, found, least) + number * found.state.added[-1].freedom
 
     best = min(inside, key=cost, default=plain_end)
     missing, left = (bench.power(each.predictions) - noise for each in (base, plain_end))
@@ -77,14 +76,7 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
 
 
 def each_refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]) -> Fit:
-    """The model with each of its effects in a finer formula where that explains what the others leave.
-
-    Args:
-        bench: the measured series.
-        base: the re-fitted model without effects.
-        current: the model.
-        tell: told what is being done.
-    """
+    """The model with each of its effects in a finer formula, as ``refined`` has its newest."""
     count = len(current.state.added)
     for _ in range(count):
         # Each in turn is the newest; after as many turns they stand as they did.

@@ -236,7 +236,7 @@ def _over_the_given(
     trace of it any more.
     """
     given = as_given(bench, base)
-    if given is None or stage.screening is None:
+    if given is None:
         return named
     left = left_of(bench, given)
     lines = lines_of(bench, bench.residuals(given.predictions, drift=True), given.state.delays)

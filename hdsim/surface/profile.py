@@ -127,12 +127,13 @@ def _waves(places: bytes, frequencies: int, gamma: float) -> tuple[Array, Array]
 def _turned(rates: Array, x: Array) -> NDArray[np.complex128]:
     """exp(i rate x), shape (rates, points); of evenly spaced places by products of a few of them."""
     points = len(x)
-    step = (x[-1] - x[0]) / (points - 1) if points > FEW else math.nan
-    even = x[:1] + step * np.arange(points)
-    if not np.all(np.abs(x - even) <= 4.0 * np.finfo(float).eps * np.max(np.abs(x), initial=0.0)):
-        angle = rates[:, None] * x
-        return np.asarray(np.cos(angle) + 1j * np.sin(angle))
-    stride = max(math.isqrt(points), 1)
-    starts = x[:1] + step * stride * np.arange(-(-points // stride))
-    far, near = (np.exp(1j * rates[:, None] * part) for part in (starts, step * np.arange(stride)))
-    return np.asarray((far[:, :, None] * near[:, None, :]).reshape(len(rates), -1)[:, :points])
+    if points > FEW:
+        step = (x[-1] - x[0]) / (points - 1)
+        off = np.max(np.abs(x - (x[0] + step * np.arange(points))))
+        if off <= 4.0 * np.finfo(float).eps * np.max(np.abs(x)):
+            stride = math.isqrt(points)
+            starts = x[0] + step * stride * np.arange(-(-points // stride))
+            far, near = (np.exp(1j * rates[:, None] * part) for part in (starts, step * np.arange(stride)))
+            return np.asarray((far[:, :, None] * near[:, None, :]).reshape(len(rates), -1)[:, :points])
+    angle = rates[:, None] * x
+    return np.asarray(np.cos(angle) + 1j * np.sin(angle))

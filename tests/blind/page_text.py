@@ -72,8 +72,8 @@ to {LEAST_NOISE:g} times the usual noise), and in the end the nearest is taken: 
 those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
-page of this version none is left out. Of its test cases (seed 19, from number 12 on) none had been looked at
-when they were run: in the order of their numbers, as many as the time allowed. Those of `teeth`, and the
+page of this version none is left out. Of its test cases (seed 19, from number 12 on) none had been looked
+into when they were run: in the order of their numbers, as many as the time allowed. Those of `teeth`, and the
 calibration cases, are of older searches.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, with their evidence: `python tests/blind

@@ -13,6 +13,7 @@ from hdsim.diagnosis.candidate_fits import as_given
 from hdsim.estimate.fit import at_present
 from hdsim.estimate.numbers import scaled
 from hdsim.estimate.opening import bench_for
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import refit
 from hdsim.estimate.state import number_at, state_of
 
@@ -48,7 +49,19 @@ def test_a_bent_model_goes_back_to_what_was_given_and_is_free_there(fitted, fact
     assert not given.theta.any()
     assert all(free.none == pytest.approx(0.0, abs=1e-12) for free in given.frees if not free.step)
     for free in given.frees:
-        assert free.value == pytest.approx(number_at(given.state, free.paths[0])) if free.paths else True
+        assert free.paths
+        assert free.value == pytest.approx(number_at(given.state, free.paths[0]))
     for own, others in zip(given.predictions, bench.predict(given.state), strict=True):
         np.testing.assert_array_equal(own, others)
     assert given.columns.shape == found.columns.shape
+
+
+def test_where_the_model_as_given_cannot_be_predicted_the_bent_one_is_asked_alone(fitted, monkeypatch):
+    bench, found = fitted
+    gone = bent(bench, found, 5.0)
+
+    def fails(state):
+        raise PredictionError("the spring's twist must grow with torque")
+
+    monkeypatch.setattr(bench, "predict", fails)
+    assert as_given(bench, gone) is None
