@@ -1,8 +1,8 @@
 """Step 1, check the data: what is missing, wrong or suspect in a record, with the evidence.
 
 Noise: ``hdsim.estimate.noise``. Spikes and saturation: ``hdsim.estimate.spikes``. Repeated and lost samples:
-``hdsim.estimate.slips``. Units, signs and ratios:
-``hdsim.estimate.factors``.
+``hdsim.estimate.clock`` where they are of all channels, else ``hdsim.estimate.slips``. Units, signs and
+ratios: ``hdsim.estimate.factors``.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from hdsim.estimate.clock import own_clock
 from hdsim.estimate.data_problems import Check, Problem, Severity
 from hdsim.estimate.factors import compare_channels
 from hdsim.estimate.noise import noise_floor
@@ -58,6 +59,7 @@ def check_record(record: Record, ratio: float, alive: Collection[str] = ()) -> C
     """
     found = Check()
     _clock(record, found)
+    _own_clock(record, found)
     for channel, values in record.channels.items():
         _channel(record, channel, values, found)
     _slips(record, found)
@@ -92,6 +94,27 @@ def _clock(record: Record, found: Check) -> None:
     if jitter > 0.05 * period:
         message = f"sampling time {period:.4g} s jitters by {jitter:.2g} s"
         found.problems.append(Problem(record.name, "time", "clock", "info", message))
+
+
+def _own_clock(record: Record, found: Check) -> None:
+    """Take each reading once, for when it was taken, where a log shows a clock of the sensors' own."""
+    clock = own_clock(record)
+    if clock is None:
+        return
+    count = int(clock.repeated.sum())
+    apart = float(np.ptp(clock.time - record.time))
+    message = (
+        f"{count} rows repeat the reading before in every channel, {clock.lost} readings are lost: log and "
+        f"sensors have clocks of their own. Repeated rows are masked, with motor_torque around them, and the "
+        f"others get the times at which they were taken (by up to {apart:.2g} s to one another)"
+    )
+    found.problems.append(Problem(record.name, "time", "clock", "info", message, count))
+    record.time = clock.time
+    for channel, good in record.trusted.items():
+        record.trusted[channel] = good & ~clock.repeated
+    near = around(clock.repeated)
+    if "motor_torque" in record.trusted and near.mean() <= MOST:
+        record.trusted["motor_torque"] = record.trusted["motor_torque"] & ~near
 
 
 def _channel(record: Record, channel: str, values: Array, found: Check) -> None:

@@ -13,6 +13,7 @@ from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.plan import LoadSource, Locked
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record, record_from
+from hdsim.estimate.reliability import knots_apart_s
 from hdsim.estimate.short_cut import take_short_cut
 from hdsim.estimate.state import state_of
 from hdsim.estimate.thin import over, thinned
@@ -83,9 +84,17 @@ def bench_for(
         for many in (records, held)
     )
     ratio, locked = scenario.drive.ratio, locked_side(scenario)
-    training, proving = (
-        predictors(many, ratio, load=load, locked=locked, arm=scenario.load.arm) for many in (records, held)
-    )
-    bench = Bench(training, proving, zeros)
+
+    def opened(apart_s: float = 0.0) -> Bench:
+        own, proving = (
+            predictors(r, ratio, load=load, locked=locked, arm=scenario.load.arm, apart_s=apart_s)
+            for r in (records, held)
+        )
+        return Bench(own, proving, zeros)
+
+    bench = opened()
+    apart_s = knots_apart_s(bench)
+    if apart_s > 0.0:
+        bench = opened(apart_s)
     take_short_cut(bench, state_of(scenario))
     return bench

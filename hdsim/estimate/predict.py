@@ -67,10 +67,17 @@ class Predictor:
         ratio: the model's signed ratio.
         arm: what the drive's joint carries, where that is a robot arm; its numbers are each candidate's own.
         rtol: relative tolerance of the integration.
+        apart_s: least time between the knots of a motion that no measured rate speaks for, s.
     """
 
     def __init__(
-        self, record: Record, plan: Plan, ratio: float, arm: Arm | None = None, rtol: float = RTOL
+        self,
+        record: Record,
+        plan: Plan,
+        ratio: float,
+        arm: Arm | None = None,
+        rtol: float = RTOL,
+        apart_s: float = 0.0,
     ) -> None:
         self.record, self.plan, self.rtol = record, plan, rtol
         turns, self._zero = 0, 0.0
@@ -82,8 +89,8 @@ class Predictor:
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
         rate = None if rate is None else (self._means.behind(rate[0]), rate[1])
-        through = spline_through(record.time, values, motion=moves, step=step, rate=rate)
-        self._spline, self._likeliest = through
+        through = spline_through(record.time, values, motion=moves, step=step, rate=rate, apart_s=apart_s)
+        self._spline, self.likeliest = through
         breaks, coefficients = pieces_of(self._spline)
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
         self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
@@ -159,6 +166,11 @@ class Predictor:
         return usual_size(again - self.motor_velocity)
 
     @property
+    def samples_a_knot(self) -> float:
+        """Samples between knots of the prescribed motion, on average."""
+        return len(self.record.time) / len(self._spline.c)
+
+    @property
     def angle_noise(self) -> float:
         """What readings of the prescribed motion differ by from it, root mean square, rad of the motor."""
         apart = self._factor * self._reading - self.motor_angle
@@ -167,8 +179,8 @@ class Predictor:
     def _moved(self, rng: np.random.Generator) -> Predictor:
         """The same record with the prescribed motion alone drawn anew."""
         found = copy(self)
-        if self._likeliest is not None:
-            coefficients: Array | None = pieces_of(self._likeliest.disturbed(rng))[1]
+        if self.likeliest is not None:
+            coefficients: Array | None = pieces_of(self.likeliest.disturbed(rng))[1]
         else:
             coefficients = drawn_anew(self.record.time, self._reading, self._spline, rng)
         if coefficients is not None:
@@ -316,6 +328,7 @@ def predictors(
     load: LoadSource | None = None,
     locked: Locked = "",
     arm: Arm | None = None,
+    apart_s: float = 0.0,
 ) -> list[Predictor]:
     """One predictor for each record."""
-    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio, arm) for r in records]
+    return [Predictor(r, plan_for(r, load=load, locked=locked), ratio, arm, apart_s=apart_s) for r in records]

@@ -48,6 +48,7 @@ def spline_through(
     motion: bool = False,
     step: float | None = None,
     rate: tuple[Array, Mask] | None = None,
+    apart_s: float = 0.0,
 ) -> tuple[BSpline | CubicSpline, Motion | None]:
     """The spline that predicts left-out samples best, and the motion that it is the mean of, if any.
 
@@ -67,6 +68,7 @@ def spline_through(
         motion: the values are an angle, whose acceleration may jump where friction changes its sign.
         step: q of the sensor; found in the values when None.
         rate: their measured derivative in any unit, shape (n,), and which samples of it count, shape (n,).
+        apart_s: least time between knots that no rate speaks for, s.
     """
     from scipy.interpolate import CubicSpline
 
@@ -79,6 +81,9 @@ def spline_through(
         chosen, beside = beside_rate(time, values, chosen, *rate, step)
     if isinstance(beside, Motion):
         return chosen, beside
+    apart = apart_s / float(np.median(np.diff(time)))
+    if len(time) / len(chosen.c) < apart and len(time) >= 5.0 * apart:
+        chosen = uniform(time, values, apart, beside) or chosen
     if motion:
         jumping = _jumping(time, values, chosen, beside)
         if jumping is not None and _score(time, values, jumping, beside) < _score(

@@ -19,10 +19,10 @@ FRICTION_NM = {1: 2.66, 3: 2.17, 4: 2.44, 6: 1.18, 7: 1.14}
 #: What least squares of the motor's torque leave in the held-out stretches of both records, N m at the motor:
 #: over velocity and its sign of a spline with a knot each 72 ms, beside inertia and the sensor's torque.
 REGRESSED_NM = {1: 0.0093, 3: 0.0100, 4: 0.0101, 6: 0.0048, 7: 0.0083}
-#: Most that may be left of the gap: a quarter, or where more does not repeat from turn to turn of the motor
-#: (which the test holds against the data), as on joint 3, what is left now. Joint 6 turns one way in most of
-#: its held-out stretches: there friction is an offset, and no gap.
-LEFT = {1: 0.25, 3: 0.28, 4: 0.25, 6: 0.53, 7: 0.25}
+#: Most that may be left of the gap: a quarter. Joint 6 turns one way in most of its held-out stretches: there
+#: friction is an offset, and no gap, and more than a quarter does not repeat from turn to turn of the motor
+#: (which the test holds against the data).
+LEFT = {1: 0.25, 3: 0.25, 4: 0.25, 6: 0.47, 7: 0.25}
 #: Names of one thing for these data: friction that turns with the direction.
 FRICTIONS = {"input_coulomb_viscous", "lugre_friction", "load_dependent_loss", "stribeck_friction"}
 #: Amplitudes of SOURCE.md, N m at the output: of the torque sensor's order 2, of the motor's order 12.
@@ -81,8 +81,10 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
     orders = {(one.channel, round(one.order, 2)): one for one in found.orders}
     if joint == 4:
         # Located, and not named: what is there wanders from period to period.
-        order = orders["output_torque", 2.0]
-        assert order.steady < 0.25
+        torque = [one for one in found.orders if one.channel == "output_torque"]
+        order = min(torque, key=lambda one: abs(one.order - 2.0))
+        assert order.order == pytest.approx(2.0, abs=0.03)
+        assert order.steady < 0.3
         assert "sensors" not in {effect.name for effect in found.effects}
         assert all(f"opti_traj_testing{k}" in order.sentence for k in (1, 2))
     else:
@@ -91,7 +93,10 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
         assert orders["output_torque", 7.0].growth == "grows"
         assert orders["motor_torque", 12.0].growth == "same"
         assert orders["motor_torque", 12.0].steady > 0.9
-    assert any(p.kind == "slips" for p in found.data_problems)
+    # Joints and logger have clocks of their own: a row repeats every 0.19 s.
+    clocks = [p for p in found.data_problems if (p.channel, p.kind) == ("time", "clock")]
+    assert len(clocks) == 2
+    assert all(15 < p.count < 60 for p in clocks)
     if joint in (6, 7):
         # The current is logged late beside the angle: 12 periods a turn would be blurred without saying so.
         assert any(p.kind == "clock" and p.channel == "motor_torque" for p in found.data_problems)
@@ -103,8 +108,9 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
         if path.endswith("order")
     }
     # The orders that the source lists for the currents of joints 5 to 7, and twice the first two of them,
-    # which the current's delay blurs.
-    assert motor == {6: {12.0, 14.0, 24.0, 28.0}, 7: {7.0, 12.0}}.get(joint, set())
+    # which the current's delay blurs. Joint 4 has some of them, ten times weaker than its friction.
+    least = {6: {7.0, 12.0, 14.0, 24.0, 28.0}, 7: {7.0, 12.0}}.get(joint, set())
+    assert least <= motor <= least | ({1.0, 2.0, 14.0, 24.0} if joint == 4 else set())
     if joint == 6:
         # The torque sensor ripples twice a wave-generator turn: 200 per output turn, ratio 100.
         sensors = next(effect for effect in found.effects if effect.name == "sensors")

@@ -1,0 +1,133 @@
+"""A log that reads a sensor on a clock of its own: its repeated rows, and when its readings were taken."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from hdsim.estimate.check import check_record
+from hdsim.estimate.clock import own_clock, taut_string
+from hdsim.estimate.records import Record
+from hdsim.estimate.spline import spline_through
+
+#: Of the log, s, and of the sensor: it is 0.55 % slower.
+LOG_S, SENSOR_S = 1e-3, 1.0055e-3
+SECONDS = 6.0
+
+
+def motion(time):
+    """Angle of an output, rad."""
+    return 1.2 * np.sin(2 * np.pi * 0.3 * time) + 0.1 * np.sin(2 * np.pi * 1.7 * time)
+
+
+def logged(pauses=()):
+    """What a log holds of a sensor's readings: each row the newest; when each was taken; which are repeated.
+
+    Args:
+        pauses: rows before which the logger paused for a reading.
+    """
+    rng = np.random.default_rng(0)
+    written = LOG_S * np.arange(int(SECONDS / LOG_S))
+    for row in pauses:
+        written[row:] += SENSOR_S
+    taken = SENSOR_S * np.arange(int(SECONDS / SENSOR_S) + 5)
+    newest = np.searchsorted(taken, written, side="right") - 1
+    repeated = np.diff(newest, prepend=-1) == 0
+    angle = motion(taken) + 2e-6 * rng.standard_normal(len(taken))
+    torque = 5.0 * np.sin(motion(taken)) + 0.02 * rng.standard_normal(len(taken))
+    channels = {"output_angle": angle[newest], "motor_torque": torque[newest]}
+    # Its stamps are those of a steady clock, whatever it did.
+    return Record("log", LOG_S * np.arange(len(written)), channels), taken[newest], repeated
+
+
+def test_readings_get_the_times_at_which_they_were_taken():
+    record, taken, repeated = logged()
+    clock = own_clock(record)
+    assert repeated.sum() > 20
+    np.testing.assert_array_equal(clock.repeated, repeated)
+    apart = (clock.time - taken)[~repeated]
+    assert np.ptp((record.time - taken)[~repeated]) > 0.95 * LOG_S
+    assert np.ptp(apart) < 0.25 * LOG_S
+    assert np.all(np.diff(clock.time) > 0)
+
+
+def test_a_motion_on_the_sensors_clock_has_no_jerk_where_a_row_repeats():
+    record, _, _ = logged()
+    errors = []
+    for own in (False, True):
+        time, rows = record.time, np.ones(len(record.time), dtype=bool)
+        if own:
+            clock = own_clock(record)
+            time, rows = clock.time, ~clock.repeated
+        spline, _ = spline_through(time[rows], record.channels["output_angle"][rows], motion=True)
+        inner = np.linspace(0.5, SECONDS - 0.5, 2000)
+        step = 1e-3
+        truth = (motion(inner + step) - 2 * motion(inner) + motion(inner - step)) / step**2
+        errors.append(np.std(spline(inner, nu=2) - truth))
+    assert errors[1] < 0.1 * errors[0]
+
+
+def test_the_check_says_so_and_trusts_no_reading_twice():
+    record, _, repeated = logged()
+    before = record.time.copy()
+    [found] = [p for p in check_record(record, 100.0).problems if p.kind == "clock"]
+    assert found.channel == "time"
+    assert found.count == repeated.sum()
+    assert "clocks of their own" in found.message
+    assert not record.trusted["output_angle"][repeated].any()
+    assert not np.array_equal(record.time, before)
+
+
+def test_a_reading_that_was_lost_is_counted():
+    pauses = [1501, 3402]
+    record, taken, repeated = logged(pauses)
+    clock = own_clock(record)
+    np.testing.assert_array_equal(clock.repeated, repeated)
+    assert clock.lost == len(pauses)
+    apart = (clock.time - taken)[~repeated]
+    # The stamps know nothing of either pause, the readings' numbers do.
+    assert np.ptp((record.time - taken)[~repeated]) > 2.9 * LOG_S
+    assert np.ptp(apart) < 2.1 * LOG_S
+    for first, last in zip([0, *pauses], [*pauses, len(taken)], strict=True):
+        inner = slice(first + 400, last - 400)
+        fresh = ~repeated[inner]
+        assert np.ptp((clock.time - taken)[inner][fresh]) < 0.8 * LOG_S
+
+
+@pytest.mark.parametrize("kind", ["noise", "rest", "one channel at rest"])
+def test_what_repeats_by_itself_is_no_clock(kind):
+    time = LOG_S * np.arange(3000)
+    rng = np.random.default_rng(3)
+    angle = np.where(time < 1.0, motion(time), motion(1.0))
+    torque = np.where(time < 1.0, np.cos(time), np.cos(1.0))
+    if kind == "noise":
+        angle, torque = motion(time), rng.standard_normal(len(time))
+    channels = {"output_angle": angle, "motor_torque": torque}
+    if kind == "one channel at rest":
+        channels = {"output_angle": np.round(angle / 1e-2) * 1e-2}
+    record = Record("log", time, channels)
+    assert own_clock(record) is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(0.2, 2.0), st.floats(-1.0, 1.0), st.floats(0.1, 1.0)), min_size=3, max_size=7
+    )
+)
+def test_no_path_between_two_others_is_shorter_than_a_taut_string(points):
+    steps, middles, widths = map(np.array, zip(*points, strict=True))
+    x, low, high = np.cumsum(steps), middles - widths, middles + widths
+    path = taut_string(x, low, high)
+    assert np.all(path >= low - 1e-9)
+    assert np.all(path <= high + 1e-9)
+
+    def length(inner):
+        y = np.concatenate([[middles[0]], inner, [middles[-1]]])
+        return float(np.sum(np.hypot(np.diff(x), np.diff(y))))
+
+    bounds = list(zip(low[1:-1], high[1:-1], strict=True))
+    other = minimize(length, middles[1:-1], bounds=bounds, method="L-BFGS-B")
+    assert length(path[1:-1]) <= other.fun + 1e-6
+    assert path[[0, -1]] == pytest.approx(middles[[0, -1]])
