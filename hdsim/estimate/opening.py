@@ -92,8 +92,8 @@ def bench_for(
         )
         return Bench(own, proving, zeros)
 
-    bench = opened()
-    apart_s = knots_apart_s(bench)
+    bench, inertia = opened(), scenario.drive.inertia
+    apart_s = knots_apart_s(bench, inertia.motor_kg_m2 + inertia.wave_generator_kg_m2)
     if apart_s > 0.0:
         bench = opened(apart_s)
     take_short_cut(bench, state_of(scenario))

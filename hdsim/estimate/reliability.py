@@ -33,11 +33,13 @@ TOLD = 2.0
 RIGHT = 0.9
 
 
-def knots_apart_s(bench: Bench) -> float:
+def knots_apart_s(bench: Bench, rotor_kg_m2: float) -> float:
     """Least time between knots of motions that the output's encoder tells, s; 0 where finer ones are right.
 
     Args:
         bench: the measured series; only what fits see is looked at.
+        rotor_kg_m2: inertia of motor and wave generator in the model as given; it counts where the slow
+            motion tells none.
     """
     sums, missed, independent = np.zeros((2, 2)), 0.0, 0.0
     for series in bench.series:
@@ -61,7 +63,7 @@ def knots_apart_s(bench: Bench) -> float:
     inertia = slow_along / slow_power
     error = math.sqrt(max(missed - inertia * slow_along, 0.0) / independent / slow_power)
     if inertia < TOLD * error:
-        return 0.0
+        inertia, error = rotor_kg_m2, 0.0
     known = fast_along / fast_power / inertia
     least = known / (1.0 + TOLD * error / inertia)
     return 0.0 if known > RIGHT or (2.0 * least - 1.0) * fast_power > slow_power else APART_S
