@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hdsim.diagnosis.again import as_good
+from hdsim.diagnosis.again import again, as_good
 
 FRICTION, OVER_ANGLE, RIPPLE = "input_coulomb_viscous", "position_dependent_friction", "motor_torque_ripple"
 #: Blocks of time of a model with neither name, what the newest leaves in them alone, and its uncertainty.
@@ -43,3 +43,32 @@ def test_the_simpler_of_two_that_explain_each_other_stays(monkeypatch, first, ne
     found = as_good(bench, current, 0, rest)
     assert (found is not None) == stays
     assert found is None or [one.effect for one in found.state.added] == [first[0]]
+
+
+@pytest.mark.parametrize("failed", [True, False])
+def test_a_fit_without_one_name_that_leaves_more_than_no_name_has_failed(monkeypatch, failed):
+    """The others alone leave 90 times the noise where no name at all leaves 5: nothing is told by that."""
+    asked = []
+
+    def without(*_):
+        return SimpleNamespace(state=None, predictions=90.0 if failed else 5.0)
+
+    def left_of(*_):
+        asked.append(True)
+        raise StopIteration
+
+    monkeypatch.setattr("hdsim.diagnosis.again.without", without)
+    monkeypatch.setattr("hdsim.diagnosis.again.left_of", left_of)
+    added = [SimpleNamespace(effect=name, at_limit=False) for name in (FRICTION, RIPPLE)]
+    current = SimpleNamespace(state=SimpleNamespace(added=added), predictions=1.0)
+    names = [SimpleNamespace(name=one.effect) for one in added]
+    bench = SimpleNamespace(power=lambda predictions: predictions)
+    base = SimpleNamespace(predictions=5.0)
+    monkeypatch.setattr("hdsim.diagnosis.again._reads", lambda *_: False)
+    if failed:
+        assert again(bench, base, current, names, str, every=True) is current
+        assert not asked
+        assert [one.name for one in names] == [FRICTION, RIPPLE]
+    else:
+        with pytest.raises(StopIteration):
+            again(bench, base, current, names, str, every=True)
