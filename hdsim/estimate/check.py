@@ -59,9 +59,9 @@ def check_record(record: Record, ratio: float, alive: Collection[str] = ()) -> C
     """
     found = Check()
     _clock(record, found)
-    _own_clock(record, found)
     for channel, values in record.channels.items():
         _channel(record, channel, values, found)
+    _own_clock(record, found)
     _slips(record, found)
     _still(record, found, alive)
     compare_channels(record, ratio, found)
@@ -104,17 +104,18 @@ def _own_clock(record: Record, found: Check) -> None:
     count = int(clock.repeated.sum())
     apart = float(np.ptp(clock.time - record.time))
     message = (
-        f"{count} rows repeat the reading before in every channel, {clock.lost} readings are lost: log and "
-        f"sensors have clocks of their own. Repeated rows are masked, with motor_torque around them, and the "
-        f"others get the times at which they were taken (by up to {apart:.2g} s to one another)"
+        f"{count} rows repeat the reading before in every channel, {clock.lost} readings are lost: log "
+        f"and sensors have clocks of their own. Repeated rows are left out, and the others get the times at "
+        f"which they were taken (by up to {apart:.2g} s to one another)"
     )
-    found.problems.append(Problem(record.name, "time", "clock", "info", message, count))
-    record.time = clock.time
-    for channel, good in record.trusted.items():
-        record.trusted[channel] = good & ~clock.repeated
     near = around(clock.repeated)
     if "motor_torque" in record.trusted and near.mean() <= MOST:
+        # A controller that was given a reading twice jerks.
         record.trusted["motor_torque"] = record.trusted["motor_torque"] & ~near
+        message += "; motor_torque around them is masked"
+    found.problems.append(Problem(record.name, "time", "clock", "info", message, count))
+    record.time = clock.time
+    record.keep(~clock.repeated)
 
 
 def _channel(record: Record, channel: str, values: Array, found: Check) -> None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.estimate.noise import quantisation_step
+from hdsim.estimate.noise import noise_floor, quantisation_step
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.slips import STEPS
 from hdsim.estimate.spikes import SPIKE_WINDOW, find_spikes
@@ -23,6 +23,8 @@ from hdsim.log.outliers import runs_of
 
 #: Rows that may repeat by accident in a record, in expectation, for all to count that do.
 BY_ACCIDENT = 0.05
+#: Least part of their usual rate at which rows must repeat while the angle moves.
+EVENLY = 0.5
 #: Most rows in succession that repeat one reading: longer, everything is at rest, or nothing was sent.
 LONGEST = 4
 #: Periods by which a reading may be older than its stamp: its own, and one by which the logger was late.
@@ -75,8 +77,9 @@ def own_clock(record: Record) -> Clock | None:
 def repeated_rows(record: Record, angle: str) -> Mask:
     """Rows in which every channel repeats the row before, and that is no accident: shape (n,).
 
-    Either channels hardly ever repeat by themselves, so that all of them at once would not by chance, or the
-    angle stands still for a row while it goes on by more than its sensor's steps before and after it.
+    Either channels hardly ever repeat by themselves, so that all of them at once would not by chance, and they
+    do in motion as often as at rest; or the angle stands still for a row while it goes on by far more than its
+    noise and steps before and after it.
 
     Args:
         record: the record.
@@ -95,14 +98,16 @@ def repeated_rows(record: Record, angle: str) -> Mask:
         together[first:last] &= last - first <= LONGEST
     if not together.any():
         return np.zeros(n, dtype=bool)
-    by_accident = n * np.prod([(one & ~together).mean() for one in alone])
-    if by_accident <= BY_ACCIDENT and len(alone) > 1:
-        return np.asarray(together)
     values = record.filled(angle)
     way = np.abs(_usual(np.diff(values, prepend=values[0])))
-    return np.asarray(
-        together & (way > STEPS * quantisation_step(values[record.trusted[angle]])) & (way > 0.0)
-    )
+    good = record.trusted[angle]
+    moving = way > STEPS * max(noise_floor(values, good), quantisation_step(values[good]), 1e-300)
+    by_accident = n * np.prod([(one & ~together).mean() for one in alone])
+    # At rest, channels with coarse steps repeat together; a clock does not wait for that.
+    evenly = (together & moving).sum() >= EVENLY * together.mean() * moving.sum()
+    if by_accident <= BY_ACCIDENT and len(alone) > 1 and evenly:
+        return np.asarray(together)
+    return np.asarray(together & moving)
 
 
 def _usual(steps: Array) -> Array:

@@ -58,6 +58,17 @@ class Record:
         for channel, values in self.channels.items():
             self.trusted.setdefault(channel, np.isfinite(values) & (np.abs(values) < LARGEST))
 
+    def keep(self, rows: Mask) -> None:
+        """Leave out all other rows, which hold no reading of their own.
+
+        Args:
+            rows: shape (n,), the first among them.
+        """
+        self.time = self.time[rows]
+        for parts in (self.channels, self.trusted, self.joints):
+            for name, values in parts.items():
+                parts[name] = values[rows]  # type: ignore[assignment]
+
     @property
     def duration_s(self) -> float:
         """Time from the first to the last sample, s."""

@@ -75,8 +75,10 @@ def test_the_check_says_so_and_trusts_no_reading_twice():
     assert found.channel == "time"
     assert found.count == repeated.sum()
     assert "clocks of their own" in found.message
-    assert not record.trusted["output_angle"][repeated].any()
-    assert not np.array_equal(record.time, before)
+    assert len(record.time) == len(record.channels["motor_torque"]) == len(before) - repeated.sum()
+    assert not np.array_equal(record.time, before[~repeated])
+    near = np.diff(np.flatnonzero(~record.trusted["motor_torque"]))
+    assert 10 * repeated.sum() < len(near) < 21 * repeated.sum()
 
 
 def test_a_reading_that_was_lost_is_counted():
@@ -131,3 +133,31 @@ def test_no_path_between_two_others_is_shorter_than_a_taut_string(points):
     other = minimize(length, middles[1:-1], bounds=bounds, method="L-BFGS-B")
     assert length(path[1:-1]) <= other.fun + 1e-6
     assert path[[0, -1]] == pytest.approx(middles[[0, -1]])
+
+
+@pytest.mark.parametrize("times", [2, 4])
+def test_a_log_that_holds_each_reading_for_some_rows_is_the_log_of_its_readings(times):
+    rng = np.random.default_rng(5)
+    time = 4e-3 * np.arange(1500)
+    read = {
+        "output_angle": motion(time) + 1e-6 * rng.standard_normal(len(time)),
+        "motor_torque": np.cos(time) + 0.01 * rng.standard_normal(len(time)),
+    }
+    held = {channel: np.repeat(values, times) for channel, values in read.items()}
+    record = Record("held", 4e-3 / times * np.arange(times * len(time)), held)
+    check_record(record, 100.0)
+    np.testing.assert_allclose(record.time, time, atol=1e-9)
+    for channel, values in read.items():
+        np.testing.assert_array_equal(record.channels[channel], values)
+        assert record.trusted[channel].all()
+
+
+def test_coarse_steps_that_stand_together_where_little_moves_are_no_clock():
+    """Everything repeats near a reversal, at one instant in ten; nothing does on the way."""
+    time = LOG_S * np.arange(6000)
+    rng = np.random.default_rng(6)
+    angle = np.round((motion(time) + 1e-6 * rng.standard_normal(len(time))) / 1e-4) * 1e-4
+    torque = np.round((5.0 * np.sin(motion(time)) + 0.001 * rng.standard_normal(len(time))) / 4e-3) * 4e-3
+    record = Record("coarse", time, {"output_angle": angle, "motor_torque": torque})
+    assert np.sum((np.diff(angle) == 0) & (np.diff(torque) == 0)) > 20
+    assert own_clock(record) is None
