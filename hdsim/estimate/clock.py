@@ -77,9 +77,9 @@ def own_clock(record: Record) -> Clock | None:
 def repeated_rows(record: Record, angle: str) -> Mask:
     """Rows in which every channel repeats the row before, and that is no accident: shape (n,).
 
-    Either channels hardly ever repeat by themselves, so that all of them at once would not by chance, and they
-    do in motion as often as at rest; or the angle stands still for a row while it goes on by far more than its
-    noise and steps before and after it.
+    Either channels hardly ever repeat by themselves, so that all of them at once would not by chance, and
+    they do in motion as often as at rest; or the angle stands still for a row while it goes on by far more
+    than its noise and steps before and after it.
 
     Args:
         record: the record.
