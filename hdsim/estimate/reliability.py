@@ -64,9 +64,8 @@ def knots_apart_s(bench: Bench, rotor_kg_m2: float) -> float:
     error = math.sqrt(max(missed - inertia * slow_along, 0.0) / independent / slow_power)
     if inertia < TOLD * error:
         inertia, error = rotor_kg_m2, 0.0
-    known = fast_along / fast_power / inertia
-    least = known / (1.0 + TOLD * error / inertia)
-    return 0.0 if known > RIGHT or (2.0 * least - 1.0) * fast_power > slow_power else APART_S
+    known = fast_along / fast_power / (inertia + TOLD * error)
+    return 0.0 if known > RIGHT or (2.0 * known - 1.0) * fast_power > slow_power else APART_S
 
 
 def _slow(predictor: Predictor) -> Array | None:
