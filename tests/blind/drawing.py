@@ -83,6 +83,12 @@ PARAMETERS = {
 GENERATOR_SHARE = 0.25
 
 
+def together(numbers: Mapping[str, float], more: Mapping[str, float]) -> dict[str, float]:
+    """True numbers of two effects; a field that both have says not whose it is, and is asked of neither."""
+    both = {**numbers, **more}
+    return {path: both[path] for path in both if not (path in numbers and path in more)}
+
+
 def draw_drive(rng: np.random.Generator, *, arm: bool, rigid: bool = False) -> Drive:
     """A drive of sizes 14 to 50 and ratios 50 to 160, both signs; numbers scale as the catalogues' do.
 

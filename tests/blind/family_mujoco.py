@@ -31,6 +31,7 @@ from drawing import (
     said,
     slower,
     started,
+    together,
     visible,
 )
 from moving import MOTIONS, motion
@@ -292,7 +293,7 @@ def _drawn(number: int, seed: int, rng: np.random.Generator) -> Try:
         asked.append(round(wanted, 3))
         near = min(near, reached / wanted)
         if same and h.numbers is not None:
-            truth |= h.numbers(x.drive, own)
+            truth = together(truth, h.numbers(x.drive, own))
     if names:
         wrong, gain, truth = off(x.drive, names, rng)
         changes = {k: v for k, v in wrong.base.items() if v != x.drive.base[k]}

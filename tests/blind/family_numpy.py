@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from contract import Case, Kind
-from drawing import log_uniform
+from drawing import log_uniform, together
 from drives import DRIVES, GRAVITY, LEVER, around, base_yaml
 from hidden import ANY, EARLIER, EFFECTS, KINDS_OF, LATER, Changes, Expected, Hidden
 from outside import OUTSIDE
@@ -173,7 +173,7 @@ def _sized(wanted: Wanted, rng: np.random.Generator, attempt: int) -> Sized | No
         found.append(one)
         misses.append(abs(float(np.log(one.beyond_base / size))))
         if wanted.same and hidden.expected is not None:
-            expected |= hidden.expected(first.drive, own)
+            expected = together(expected, hidden.expected(first.drive, own))
     changes = off | changes
     lost = max(unresolved(setup, changes) for setup in (*setups, *held))
     if lost > max(LOST, LOST_OF_STRENGTH * max((s.beyond_base for s in found), default=0.0)):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contract import Case, Measured
+from drawing import together
 from judging import borne_out, closed, covered, false_alarm, false_name, outcome, stated
 from page import page
 from page_tables import band, rate
@@ -263,3 +264,8 @@ def test_a_stand_in_with_what_was_put_in_needs_its_order(order, wanted):
     one = real("effect", OWN, order=4.0, before=[OWN])
     one["verdict"]["effects"] = [named | {"parameters": {}, "settings": ripple}]
     assert outcome(one) == wanted
+
+
+def test_a_field_that_two_hidden_effects_have_is_asked_of_neither():
+    bristles, flexspline = {"coulomb_nm": 0.03, "stiffness_nm": 17.7}, {"stiffness_nm": 5e4, "form": 2.0}
+    assert together(bristles, flexspline) == {"coulomb_nm": 0.03, "form": 2.0}
