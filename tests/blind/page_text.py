@@ -73,9 +73,10 @@ those that were reached.
 
 `--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
 page of this version none is left out. Of its test cases (seed 19, from number 12 on, of `real` from 36 on)
-none had been looked into when they were run: in the order of their numbers, as many as time allowed. Those
-of `real` had been run once before, when repeated rows of a log were masked and not left out; their outcomes
-were seen. Those of `teeth`, and the calibration cases, are of older searches.
+none had been looked into when they were run: in the order of their numbers, as many as time allowed. Those of
+`real` had been run twice before, with the first versions of how repeated rows are treated and of how finely a
+motion is followed; their outcomes were seen. Those of `teeth`, and the calibration cases, are of older
+searches.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, with their evidence: `python tests/blind
 page` generates the page from them, and `decide` can judge every one again.
