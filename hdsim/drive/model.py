@@ -177,7 +177,7 @@ class Model(Contributed):
         output = self.load_inertia_kg_m2
         if not self.has_ring and self.drive.arrangement == "circular_spline_fixed":
             output += inertia.ring_kg_m2
-        return inertia.motor_kg_m2 + inertia.wave_generator_kg_m2, inertia.ring_kg_m2, output
+        return inertia.rotor_kg_m2, inertia.ring_kg_m2, output
 
     def _assemble(self) -> System:
         from hdsim.drive import _layout as a

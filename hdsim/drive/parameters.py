@@ -94,6 +94,11 @@ class Inertia(Parameters):
     ring_kg_m2: float = Field(2.0e-5, gt=0)
     """Toothed ring of the flexspline, kg m^2."""
 
+    @property
+    def rotor_kg_m2(self) -> float:
+        """All that turns with the motor, kg m^2."""
+        return self.motor_kg_m2 + self.wave_generator_kg_m2
+
 
 #: Default smoothing speed of sign(speed), rad/s of the motor: under 3 N m, where 4 N m drive a size 20 back,
 #: it creeps by 0.3 arcsec a minute. A stuck motor costs the default solver no more steps than a creeping one.

@@ -151,12 +151,16 @@ def _columns(predictor: Predictor, series: Series, state: State) -> Array:
     """Terms of a series' regression without its orders, shape (n, p); none for a sensor that is the load."""
     if _is_load(predictor, series):
         return np.zeros((len(series.measured), 0))
+    return np.column_stack([beside_inertia(predictor, state), predictor.motor_acceleration])
+
+
+def beside_inertia(predictor: Predictor, state: State) -> Array:
+    """Terms of a record's regression but its acceleration: gravity, friction, known load; shape (n, p)."""
     angle, speed = predictor.motor_angle / predictor.ratio, predictor.motor_velocity
     place = [angle, angle**3] if predictor.plan.locked else [np.sin(angle), np.cos(angle)]
     if predictor.plan.load == "output_torque":
         place = []  # the sensor reads gravity too
-    terms = [*place, np.tanh(speed / RESOLVED_RAD_PER_S), speed, predictor.motor_acceleration]
-    return np.column_stack([*terms, *_load(predictor, state)])
+    return np.column_stack([*place, np.tanh(speed / RESOLVED_RAD_PER_S), speed, *_load(predictor, state)])
 
 
 def _features(predictor: Predictor, series: Series, state: State) -> Array:

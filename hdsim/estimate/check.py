@@ -15,7 +15,7 @@ from hdsim.estimate.clock import own_clock
 from hdsim.estimate.data_problems import Check, Problem, Severity
 from hdsim.estimate.factors import compare_channels
 from hdsim.estimate.noise import noise_floor
-from hdsim.estimate.records import LARGEST, Array, Record
+from hdsim.estimate.records import LARGEST, Array, Mask, Record
 from hdsim.estimate.slips import MOST, around, find_slips
 from hdsim.estimate.spikes import find_spikes, largest_jump, saturated
 
@@ -53,7 +53,7 @@ def check_record(record: Record, ratio: float, alive: Collection[str] = ()) -> C
     """Check a record, and take what is not to be trusted out of its masks.
 
     Args:
-        record: the record; its ``trusted`` masks are narrowed in place.
+        record: the record; its ``trusted`` masks are narrowed in place, and rows that repeat others left out.
         ratio: the model's signed ratio motor angle / output angle.
         alive: torques that differ between this record and others.
     """
@@ -101,21 +101,28 @@ def _own_clock(record: Record, found: Check) -> None:
     clock = own_clock(record)
     if clock is None:
         return
-    count = int(clock.repeated.sum())
-    apart = float(np.ptp(clock.time - record.time))
+    count, kept = int(clock.repeated.sum()), ~clock.repeated
+    apart = float(np.ptp(clock.time - record.time[kept]))
     message = (
         f"{count} rows repeat the reading before in every channel, {clock.lost} readings are lost: log "
         f"and sensors have clocks of their own. Repeated rows are left out, and the others get the times at "
         f"which they were taken (by up to {apart:.2g} s to one another)"
     )
-    near = around(clock.repeated)
-    if "motor_torque" in record.trusted and near.mean() <= MOST:
-        # A controller that was given a reading twice jerks.
-        record.trusted["motor_torque"] = record.trusted["motor_torque"] & ~near
+    # A controller that was given a reading twice jerks.
+    if _masked_around(record, clock.repeated):
         message += "; motor_torque around them is masked"
     found.problems.append(Problem(record.name, "time", "clock", "info", message, count))
+    record.keep(kept)
     record.time = clock.time
-    record.keep(~clock.repeated)
+
+
+def _masked_around(record: Record, slips: Mask) -> int:
+    """Take the motor's torque around slips out; how many samples that are: 0 where they would be too many."""
+    near = around(slips)
+    if near.mean() > MOST or "motor_torque" not in record.trusted:
+        return 0
+    record.trusted["motor_torque"] = record.trusted["motor_torque"] & ~near
+    return int(near.sum())
 
 
 def _channel(record: Record, channel: str, values: Array, found: Check) -> None:
@@ -175,13 +182,13 @@ def _slips(record: Record, found: Check) -> None:
         slips = find_slips(record.time, record.filled(angle), rate[0], record.trusted[angle] & rate[1])
         if not slips.any():
             continue
-        near, count = around(slips), int(slips.sum())
+        count, masked = int(slips.sum()), _masked_around(record, slips)
         message = f"{count} samples are repeated or lost, by what its velocity says of the way between them"
-        if near.mean() > MOST:
-            message += "; too many to be left out"
-        else:
-            message += f"; {int(near.sum())} samples of motor_torque around them are masked"
-            record.trusted["motor_torque"] = record.trusted["motor_torque"] & ~near
+        message += (
+            f"; {masked} samples of motor_torque around them are masked"
+            if masked
+            else "; too many to be left out"
+        )
         found.problems.append(Problem(record.name, angle, "slips", "warning", message, count))
 
 

@@ -36,7 +36,7 @@ class Clock:
     """When the readings of a record were taken.
 
     Attributes:
-        time: shape (n,), s, from 0, strictly increasing; where a row repeats, between its neighbours'.
+        time: of the rows that do not repeat, shape (m,), s, from 0, strictly increasing.
         repeated: shape (n,), rows that repeat the one before.
         lost: readings that were not logged.
     """
@@ -68,10 +68,7 @@ def own_clock(record: Record) -> Clock | None:
     ticks -= np.diff(fresh, prepend=fresh[0] - 1) - 1
     number = np.cumsum(np.maximum(ticks, 1.0) + lost)
     taken = taut_string(number, time[fresh] - OLDEST * period, time[fresh])
-    # After the last one nobody knows; the log's own clock goes on.
-    rows = np.arange(len(time))
-    found = np.interp(rows, fresh, taken) + np.maximum(rows - fresh[-1], 0) * period
-    return Clock(found - found[0], repeated, int(lost.sum()))
+    return Clock(taken - taken[0], repeated, int(lost.sum()))
 
 
 def repeated_rows(record: Record, angle: str) -> Mask:

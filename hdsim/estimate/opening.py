@@ -92,9 +92,9 @@ def bench_for(
         )
         return Bench(own, proving, zeros)
 
-    bench, inertia = opened(), scenario.drive.inertia
-    apart_s = knots_apart_s(bench, inertia.motor_kg_m2 + inertia.wave_generator_kg_m2)
+    bench, state = opened(), state_of(scenario)
+    apart_s = knots_apart_s(bench, state)
     if apart_s > 0.0:
         bench = opened(apart_s)
-    take_short_cut(bench, state_of(scenario))
+    take_short_cut(bench, state)
     return bench

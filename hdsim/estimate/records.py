@@ -65,9 +65,9 @@ class Record:
             rows: shape (n,), the first among them.
         """
         self.time = self.time[rows]
-        for parts in (self.channels, self.trusted, self.joints):
-            for name, values in parts.items():
-                parts[name] = values[rows]  # type: ignore[assignment]
+        self.channels = {channel: values[rows] for channel, values in self.channels.items()}
+        self.trusted = {channel: good[rows] for channel, good in self.trusted.items()}
+        self.joints = {joint: angle[rows] for joint, angle in self.joints.items()}
 
     @property
     def duration_s(self) -> float:

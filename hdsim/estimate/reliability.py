@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.drive.parameters import RESOLVED_RAD_PER_S
+from hdsim.estimate.baseline import beside_inertia
 from hdsim.estimate.knots import uniform
 from hdsim.estimate.records import Array
 
 if TYPE_CHECKING:
     from hdsim.estimate.bench import Bench
     from hdsim.estimate.predict import Predictor
+    from hdsim.estimate.state import State
 
 #: Time between the knots of a slow motion, s. Along the recordings of five joints of a Kinova Gen3 the
 #: inertia no longer depends on it from 14 ms on, and 14 to 30 ms give the same effects, but for a weak ripple
@@ -34,13 +35,12 @@ TOLD = 2.0
 RIGHT = 0.9
 
 
-def knots_apart_s(bench: Bench, rotor_kg_m2: float) -> float:
+def knots_apart_s(bench: Bench, state: State) -> float:
     """Least time between knots of motions that the output's encoder tells, s; 0 where finer ones are right.
 
     Args:
         bench: the measured series; only what fits see is looked at.
-        rotor_kg_m2: inertia of motor and wave generator in the model as given; it counts where the slow
-            motion tells none.
+        state: the model as given; the inertia of its rotor counts where the slow motion tells none.
     """
     sums, missed, independent = np.zeros((2, 2)), 0.0, 0.0
     for series in bench.series:
@@ -52,7 +52,7 @@ def knots_apart_s(bench: Bench, rotor_kg_m2: float) -> float:
         if slow is None:
             continue
         values = np.column_stack([series.measured, predictor.motor_acceleration, slow])[rows]
-        beside = _beside(predictor)[rows]
+        beside = np.column_stack([np.ones(len(slow)), beside_inertia(predictor, state)])[rows]
         values -= beside @ np.linalg.lstsq(beside, values, rcond=None)[0]
         torque, accelerations = values[:, 0], values[:, 1:]
         sums += np.array([accelerations.T @ torque, (accelerations**2).sum(axis=0)])
@@ -64,7 +64,7 @@ def knots_apart_s(bench: Bench, rotor_kg_m2: float) -> float:
     inertia = slow_along / slow_power
     error = math.sqrt(max(missed - inertia * slow_along, 0.0) / independent / slow_power)
     if inertia < TOLD * error:
-        inertia, error = rotor_kg_m2, 0.0
+        inertia, error = state.drive.inertia.rotor_kg_m2, 0.0
     known = fast_along / fast_power / (inertia + TOLD * error)
     return 0.0 if known > RIGHT or (2.0 * known - 1.0) * fast_power > slow_power else APART_S
 
@@ -77,15 +77,3 @@ def _slow(predictor: Predictor) -> Array | None:
         return None
     spline = uniform(record.time, record.filled("output_angle"), spacing)
     return None if spline is None else np.asarray(predictor.ratio * spline(record.time, nu=2))
-
-
-def _beside(predictor: Predictor) -> Array:
-    """What else the motor's torque follows: friction, and the load, or gravity where none is measured."""
-    record, plan, speed = predictor.record, predictor.plan, predictor.motor_velocity
-    columns = [np.ones(len(speed)), speed, np.tanh(speed / RESOLVED_RAD_PER_S)]
-    if plan.load != "scenario":
-        columns.append(record.filled(plan.load))
-    else:
-        angle = record.filled("output_angle")
-        columns += [np.sin(angle), np.cos(angle)]
-    return np.column_stack(columns)

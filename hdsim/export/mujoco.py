@@ -94,7 +94,7 @@ def mjcf(scenario: Scenario, *, weigh: bool = False) -> tuple[str, tuple[Lost, .
         told = f"friction of the mean torque, {mean:.3g} N m"
         lost.append(Lost("friction that grows with the load", told, without=without))
     coulomb, viscous = (sum(column) for column in zip(*frictions, strict=True))
-    motor = drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2
+    motor = drive.inertia.rotor_kg_m2
     with_output = drive.arrangement == "circular_spline_fixed"
     hanging = _Hanging(scenario)
     output = hanging.inertia_kg_m2 + (drive.inertia.ring_kg_m2 if with_output else 0.0)

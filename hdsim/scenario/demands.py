@@ -85,7 +85,7 @@ def _inertia(scenario: Scenario) -> list[str]:
     drive, inertia = scenario.drive, scenario.load.inertia_kg_m2
     if scenario.command.motor.type == "locked":
         return []
-    own = drive.ratio**2 * (drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2)
+    own = drive.ratio**2 * drive.inertia.rotor_kg_m2
     if inertia <= INERTIA_RATIO * own:
         return []
     swing = math.sqrt(drive.torsion.stiffness_k1_nm_per_rad / inertia) / (2.0 * math.pi)

@@ -241,7 +241,7 @@ class Scenario(Parameters):
             "drive": f"{drive.preset or 'without preset'}, ratio {drive.ratio:g}, "
             f"rated torque {drive.rated_torque_nm:g} N m, {drive.mesh.model} mesh\n"
             f"K1, K2, K3 {', '.join(f'{k:.0f}' for k in stiffness)} N m/rad; motor and wave generator "
-            f"{drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2:.3g} kg m^2",
+            f"{drive.inertia.rotor_kg_m2:.3g} kg m^2",
             "effects": "\n".join(self._effects_told()) or "none",
             "command": f"motor {self.command.motor.type}, output {self.command.output.type}",
             "load": ", ".join(load_parts),

@@ -19,9 +19,7 @@ def position_loop(
     The gains are the bandwidths times the inertia at the motor, load included; the motor's encoder closes the
     loop, so that what the gear does wrong stays in the output angle, as in a joint with one encoder.
     """
-    inertia = (
-        drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2 + load_inertia_kg_m2 / drive.ratio**2
-    )
+    inertia = drive.inertia.rotor_kg_m2 + load_inertia_kg_m2 / drive.ratio**2
     return {
         "type": "position",
         "at": "output",

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def analytic_frequency(drive: Drive, load_inertia_kg_m2: float, *, locked: bool) -> float:
     """Natural frequency of the two-mass model with the middle stiffness K2, Hz."""
-    motor = drive.inertia.motor_kg_m2 + drive.inertia.wave_generator_kg_m2
+    motor = drive.inertia.rotor_kg_m2
     stiffness = drive.torsion.stiffness_k2_nm_per_rad
     return two_mass_frequency(stiffness, load_inertia_kg_m2, motor, drive.ratio, locked=locked)
 
