@@ -66,9 +66,10 @@ def robust_covariance(
         return whole[: len(priors), : len(priors)]
     from scipy.special import stdtrit
 
-    power = max(float(np.mean(rest**2)), 1e-30)
-    # The prior keeps a direction that the data say nothing about from having no spread at all.
-    information = columns.T @ columns + np.diag(power / priors**2)
+    power, sample = max(float(np.mean(rest**2)), 1e-30), sample_power(rest, blocks)
+    # As in the fit (``minimise``): where what is left is correlated, a prior counts as many samples more, or
+    # numbers that the data cannot tell apart would seem to be moved farther than anybody believed.
+    information = columns.T @ columns + np.diag(sample / priors**2)
     sizes = np.sqrt(np.diag(information))
     sizes[sizes == 0.0] = 1.0
     bread = _inverse(information, sizes)
@@ -83,7 +84,7 @@ def robust_covariance(
         parts.append(np.einsum("ij,jk,ik->i", without, square, without))
     away, variances = np.array(moves), np.array(parts)
     clustered = away.T @ away * (len(away) - 1) / len(away)
-    clustered += bread @ np.diag(power**2 / priors**2) @ bread
+    clustered += bread @ np.diag(sample**2 / priors**2) @ bread
     # Few blocks can make the clustered spread too small by chance: white noise is its least.
     white = power * np.diag(bread)
     dead = np.flatnonzero(np.diag(clustered) == 0.0)
