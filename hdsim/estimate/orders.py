@@ -16,6 +16,9 @@ DENSE_ORDER, HIGHEST_ORDER = 4.6, 60.0
 #: Fewest periods of an order that make it one, in a turn and more, and in less than one, where no order comes
 #: back to where it began (estimates: with fewer a slow change, or a loop of hysteresis, looks like it).
 PERIODS, PERIODS_IN_PART = 1.5, 8.0
+#: Highest frequency of an order at the usual speed, in sample rates. Beyond half of one it is read as another
+#: one, but that lies above 0.4, where nothing slow can be meant.
+QUICKEST = 0.6
 #: Samples of which an order spectrum is made.
 SPECTRUM_SAMPLES = 8000
 #: Share of a channel's residual that a line of an order spectrum must hold to be listed.
@@ -135,7 +138,7 @@ def over_angle(
         turns = max(turns, float(np.ptp(parts[-1][0])) / (2 * np.pi))
         fastest = max(fastest, float(np.quantile(np.abs(predictor.motor_velocity), 0.5)) / (2 * np.pi))
         period = max(period, predictor.record.period_s)
-    highest = min(HIGHEST_ORDER, 0.4 / period / fastest) if fastest > 0.0 else 0.0
+    highest = min(HIGHEST_ORDER, QUICKEST / period / fastest) if fastest > 0.0 else 0.0
     lowest = max(0.5, (PERIODS if turns >= 1.0 else PERIODS_IN_PART) / max(turns, 1e-9))
     if lowest > highest:
         return None

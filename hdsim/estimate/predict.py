@@ -22,7 +22,13 @@ from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import PhysicsError
 from hdsim.estimate.known_load import Gravity, arm_course
 from hdsim.estimate.lead_in import LeadInDamper
-from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of_means, usual_size
+from hdsim.estimate.noise import (
+    noise_of_means,
+    quantisation_step,
+    step_of_means,
+    usual_size,
+    without_orders,
+)
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
 from hdsim.estimate.records import Array, Mask, Record
 from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
@@ -208,8 +214,11 @@ class Predictor:
         record, raw = self.record, self.record.as_read
         values, trusted = record.filled(channel), record.trusted[channel]
         step = quantisation_step(raw.channels[channel][raw.trusted[channel]])
+        angle = self._factor * raw.filled(self.plan.motion)
 
         def noises(read: Array, good: Mask, step: float, means: Array, whole: Mask) -> tuple[float, float]:
+            read = without_orders(read, good, angle)
+            means = read if means is read else without_orders(means, whole, self.motor_angle)
             single = noise_of_means(read, good, step, read, good, 1)
             return noise_of_means(read, good, step, means, whole, record.readings), single
 

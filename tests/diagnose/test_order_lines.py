@@ -34,6 +34,16 @@ def test_a_loop_over_part_of_a_turn_is_no_line():
     assert order_lines(bench_of(time, angle, loop), [loop], "motor_torque") == []
 
 
+def test_an_order_just_beyond_half_the_sample_rate_is_that_order():
+    """Read as 110 Hz of 140, which at 14 turns a second is no whole order."""
+    time = np.arange(1800) / 250.0
+    angle = 2.0 * np.pi * (14.0 * time - 2.0 * np.exp(-2.0 * time))
+    torque = 0.1 * np.sin(10 * angle) + 0.01 * np.random.default_rng(1).standard_normal(len(time))
+    [line] = order_lines(bench_of(time, angle, torque), [torque], "motor_torque")
+    assert line.order == pytest.approx(10.0, abs=0.01)
+    assert line.amplitude == pytest.approx(0.1, rel=0.03)
+
+
 @pytest.mark.parametrize("late", [-2, 0, 2.5])
 def test_the_age_of_a_torque_is_told_by_the_order_that_it_blurs(late):
     time = np.arange(6000) * 1e-3

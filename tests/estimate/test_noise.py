@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.noise import noise_floor, quantisation_step
+from hdsim.estimate.noise import noise_floor, quantisation_step, without_orders
 from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
 
@@ -97,6 +97,42 @@ def test_held_out_records_are_weighed_as_their_channel():
     bench.weigh([np.tile([1e-4, -1e-4], 2000), rest[1]])
     learnt, held = (s.sigma for s in bench.series)
     assert held == pytest.approx(learnt, rel=0.2)
+
+
+def turning(order: float, size: float, hum: float = 0.0) -> Record:
+    """A motor at 14 turns a second read at 250 Hz; its torque has a ripple, and a hum of 113 Hz."""
+    rng, time = np.random.default_rng(7), np.arange(1800) / 250.0
+    angle = 2.0 * np.pi * (14.0 * time - 2.0 * np.exp(-2.0 * time))
+    torque = 0.3 + size * np.sin(order * angle + 1.0) + hum * np.sin(2.0 * np.pi * 113.0 * time)
+    torque += 0.01 * rng.standard_normal(1800)
+    return Record("joint", time, {"motor_angle": angle, "motor_torque": torque})
+
+
+@pytest.mark.parametrize("order", [5.0, 6.0, 7.0, 8.0, 10.0])
+def test_a_quick_ripple_of_the_motors_turn_is_no_noise(order):
+    """Orders 5 to 8 are 70 to 112 Hz of 125; order 10 is read as 110 Hz."""
+    record = turning(order, 0.2)
+    as_noise = noise_floor(record.channels["motor_torque"], np.ones(1800, dtype=bool))
+    _, _, noise, _ = Predictor(record, plan_for(record), 100.0).measured("motor_torque")
+    assert as_noise > 0.03
+    assert noise == pytest.approx(0.01, rel=0.1)
+
+
+def test_what_is_no_order_of_the_turn_stays_noise():
+    everything = np.ones(1800, dtype=bool)
+    for record in (turning(5.0, 0.0), turning(5.0, 0.0, hum=0.05)):
+        torque = record.channels["motor_torque"]
+        angle = record.channels["motor_angle"]
+        np.testing.assert_array_equal(without_orders(torque, everything, angle), torque)
+        np.testing.assert_array_equal(without_orders(torque, everything, 0.01 * angle), torque)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.integers(400, 3000), st.floats(0.3, 40.0))
+def test_white_noise_has_no_order(seed, n, turns_a_second):
+    noise = np.random.default_rng(seed).standard_normal(n)
+    angle = 2.0 * np.pi * (3.0 + turns_a_second) * np.arange(n) / 250.0
+    np.testing.assert_array_equal(without_orders(noise, np.ones(n, dtype=bool), angle), noise)
 
 
 @pytest.mark.skipif(not JOINT.exists(), reason="the recording is not here")
