@@ -245,8 +245,17 @@ def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> l
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             there = point_at(bench, base, best.theta[: len(base.frees)])
             for other in others:
+                gone: list[Fit] = []
                 for each in _begun_at(bench, base, there, other):
-                    ends += _to_its_end(bench, base, each, enough)
+                    if not any(_same_way(bench, each, one) for one in gone):
+                        ends += _to_its_end(bench, base, each, enough)
+                        gone.append(each)
+
+
+def _same_way(bench: Bench, one: Fit, other: Fit) -> bool:
+    """Whether two fits have come to the same place, whichever way each began."""
+    apart = bench.power(one.predictions) / bench.power(other.predictions)
+    return abs(apart - 1.0) < STALLED and one.state.added[-1].beside(other.state.added[-1])
 
 
 def _begun_at(bench: Bench, base: Fit, there: Point, other: Added) -> Iterator[Fit]:

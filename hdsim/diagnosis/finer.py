@@ -33,6 +33,8 @@ from hdsim.estimate.state import Added
 
 #: Evaluations of a fit, and most times that it is carried on.
 EVALUATIONS, TIMES = 14, 2
+#: Part of the fits from several starts that is carried on each time, those that leave least.
+CARRIED_ON = 0.5
 
 
 def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]) -> Fit:
@@ -51,16 +53,17 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
         return current
     tell(f"fitting a finer {plain.effect}")
     with bench.coarse():
-        ends = [_at_its_end(bench, current, [*others, one]) for one in _nearest(bench, current, begins)]
+        ways = [(current, [*others, one]) for one in _nearest(bench, current, begins)]
         given = as_given(bench, current)
         if given is not None:
             # A plain formula may have bent the base to stand in for what it lacks.
-            ends += [_at_its_end(bench, given, [*others, one]) for one in _nearest(bench, given, begins)]
+            ways += [(given, [*others, one]) for one in _nearest(bench, given, begins)]
+        ends = _at_their_ends(bench, ways)
         # The plain one may not have been at its end.
-        as_it_is = _at_its_end(bench, current, [*others, plain])
-    plain_end = as_it_is or current
+        as_it_is = _at_their_ends(bench, [(current, [*others, plain])])
+    plain_end = as_it_is[0] if as_it_is else current
     # At the end of a range its further numbers are told no more.
-    inside = [found for found in ends if found is not None and not found.state.added[-1].at_limit]
+    inside = [found for found in ends if not found.state.added[-1].at_limit]
     least = min([plain_end, *inside], key=lambda found: bench.power(found.predictions))
     rest, blocks = bench.stacked(bench.residuals(least.predictions)), bench.stacked_blocks()
     sample, number = bench.sample_power(rest), worth_of_a_number(rest, blocks)
@@ -115,17 +118,30 @@ def _nearest(bench: Bench, current: Fit, begins: Sequence[Added]) -> list[Added]
     return [one for _, one in least.values()]
 
 
-def _at_its_end(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
-    """All numbers fitted from where they are, with these effects, as far as that leads; None if nowhere."""
-    found = _fitted(bench, current, added)
+def _at_their_ends(bench: Bench, ways: Sequence[tuple[Fit, list[Added]]]) -> list[Fit]:
+    """All numbers fitted with these effects, from where each way begins, as far as that leads.
+
+    Those that leave least are carried on, fewer each time (successive halving: Jamieson and Talwalkar 2016,
+    AISTATS 51:240): most of several starts are seen early to end in the same place or in a worse one.
+
+    Args:
+        bench: the measured series.
+        ways: a fit to go on from, and the effects.
+
+    Returns:
+        Where each has come to; without those that led nowhere.
+    """
+    begun = (_fitted(bench, current, added) for current, added in ways)
+    ends = [found for found in begun if found is not None]
+    on = list(range(len(ends)))
     for _ in range(TIMES):
-        further = None if found is None else _fitted(bench, found, list(found.state.added))
-        if found is None or further is None:
-            break
-        if bench.power(further.predictions) >= bench.power(found.predictions):
-            break
-        found = further
-    return found
+        lower: dict[int, float] = {}
+        for k in on:
+            further = _fitted(bench, ends[k], list(ends[k].state.added))
+            if further is not None and bench.power(further.predictions) < bench.power(ends[k].predictions):
+                ends[k], lower[k] = further, bench.power(further.predictions)
+        on = sorted(lower, key=lower.__getitem__)[: math.ceil(CARRIED_ON * len(on))]
+    return ends
 
 
 def _fitted(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:

@@ -1,6 +1,7 @@
 """Maxwell elements shifted by one almost cover one another: a fit does not end at the wrong ones."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from diagnose_bench import servo_with_arm
 
 import hdsim
+from hdsim.diagnosis import candidate_fits
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.contest import contest
 from hdsim.diagnosis.screen import Residual
@@ -106,3 +108,26 @@ def test_a_held_shape_is_a_setting_that_writes_the_same_effect() -> None:
     assert held.settings() == free.settings() == {"slip_torque_nm": 1.5, "slip_twist_scale": 0.7}
     assert held.freedom == 1
     assert "slip_twist_scale" not in fitting.settings
+
+
+def test_two_ways_to_one_place_are_not_both_carried_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shapes held at first or free from the first step on mostly end alike, and the way on is long."""
+    (fitting,) = catalogue()[MAXWELL].fittings
+    (added,) = starts(MAXWELL, fitting, (), {"torque_nm": 20.0, "twist_arcmin": 3.0})[:1]
+
+    def fit_at(scale: float, power: float) -> Any:
+        state = SimpleNamespace(added=(replace(added, shapes=(scale,)),))
+        return SimpleNamespace(state=state, theta=np.zeros(0), predictions=power)
+
+    begun = [fit_at(0.1, 500.0), fit_at(0.101, 501.0), fit_at(0.8, 500.0), fit_at(0.1, 600.0)]
+    carried_on: list[Any] = []
+    monkeypatch.setattr(candidate_fits, "point_at", lambda *_: None)
+    monkeypatch.setattr(candidate_fits, "_begun_at", lambda *_: iter(begun))
+    monkeypatch.setattr(candidate_fits, "_to_its_end", lambda _, __, one, ___: carried_on.append(one) or [])
+    bench: Any = SimpleNamespace(power=lambda predictions: predictions)
+    base: Any = SimpleNamespace(frees=[])
+    found = fit_at(0.3, 400.0)
+    candidate_fits.fits_at_next_minima(bench, base, found, 800.0)
+    wanted = [0, 2, 3] * (len(carried_on) // 3)
+    assert carried_on
+    assert carried_on == [begun[k] for k in wanted]
