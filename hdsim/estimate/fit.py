@@ -209,8 +209,8 @@ def strain(found: Fit) -> float:
 def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
     """The base's numbers with 95 % intervals; those that the data do not bound are marked undetermined.
 
-    They were left alone, or the fit knows them no better than was believed before it: what such an interval
-    excludes, its prior and the other numbers exclude, and not the data.
+    They were left alone, or what was believed before the fit says more of them than the data do: what such an
+    interval excludes, its prior and the other numbers exclude, and not the data.
 
     Args:
         found: the fit.
@@ -222,7 +222,8 @@ def base_intervals(found: Fit, starts: Sequence[Free]) -> list[Interval]:
         now, spread = float(found.theta[k]), min(2.0 * math.sqrt(found.covariance[k, k]), WIDEST)
         value, low, high = free.at(now), free.at(now - spread), free.at(now + spread)
         start = first.get(free.name, free.value)
-        bound = found.covariance[k, k] < free.prior**2
+        # Information adds up, and the data's is more than the prior's.
+        bound = found.covariance[k, k] < 0.5 * free.prior**2
         if not bound:
             low = high = math.nan
         tied = [] if bound else _tied(found, k)
