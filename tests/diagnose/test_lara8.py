@@ -32,9 +32,8 @@ LINES, LINES_ARCSEC = (2.0, 2.0 * (1.0 - 1.0 / RATIO)), (2.5, 2.8)
 
 #: Stiffness (times the catalogue's), with friction, with the arm's weight.
 BASES = [(k, friction, arm) for arm in (True, False) for friction in (True, False) for k in (0.5, 1.0, 2.0)]
-#: Of bases with twice the stiffness and with friction the first stiffness is said to be off, and upwards: not
-#: solved. With the weight rounding added hysteresis of 0.04 mrad (0.77) on some processors: it may fail.
-TOO_STIFF = 2.0
+#: Of the base with twice the stiffness, friction and weight rounding added hysteresis of 0.04 mrad (0.77) on
+#: some processors: it may fail.
 ON_EDGE = (2.0, True, True)
 #: Those that are run each time: every stiffness, with and without friction and arm, but not with both.
 OFTEN = {(0.5, False, True), (1.0, True, False), (2.0, False, False)}
@@ -167,9 +166,6 @@ def test_twelve_bases_get_one_verdict(tmp_path, k, friction, arm):
         assert low < LINES_ARCSEC[1]
         assert high > LINES_ARCSEC[0]
     # No number is said to be off that these data do not tell: the wind-up hides behind the encoder's turn.
-    if k < TOO_STIFF or not friction:
-        stiffness = found.parameters["drive.torsion.stiffness_k1_nm_per_rad"]
-        told = stiffness.interval is None or stiffness.interval[0] < 3.5e4 < stiffness.interval[1]
-        assert told
-        assert "drive.torsion.stiffness_k1_nm_per_rad" not in found.moved
+    assert found.parameters["drive.torsion.stiffness_k1_nm_per_rad"].interval is None
+    assert "drive.torsion.stiffness_k1_nm_per_rad" not in found.moved
     assert found.gap["output_angle"].after < 0.3 * found.gap["output_angle"].refit
