@@ -11,7 +11,7 @@ from hdsim.diagnosis.revise import without
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, screen
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit
+from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.orders import Line, lines_of
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added
@@ -70,8 +70,10 @@ def again(
         rest = without(bench, current, k)
         if rest is None or bench.power(rest.predictions) > (1.0 + NEWS) * bench.power(base.predictions):
             # More than with no effect at all: the fit has failed.
-            k += 1
-            continue
+            if len(names) > 1:
+                k += 1
+                continue
+            rest = sharpened(bench, base)
         left = left_of(bench, rest)
         peaks = lines_of(bench, bench.residuals(rest.predictions, drift=True), rest.state.delays)
         tell(f"{own.name} again")

@@ -66,7 +66,7 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
             kept, k = alike
             left_out = others[k]
             assert left_out is not None
-            named[kept].alike |= {named[kept].name, named[k].name, *named[kept].group, *named[k].group}
+            named[kept].alike |= {named[kept].name, named[k].name}
         del named[k]
         # What the others make up for it takes them a few more steps.
         current = together(bench, left_out)

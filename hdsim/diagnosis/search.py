@@ -104,8 +104,8 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
         tell = during("again", "testing each effect beside the others")
         count = len(found.named)
         found.fit = revised(bench, found.fit, found.named, tell)
-        if 1 < len(found.named) < count:
-            # Beside a name that was needless others may have been wrong.
+        if len(found.named) < count:
+            # Beside a name that was needless others may have been wrong, or as good as the one that is left.
             before = found.stages[0].screening
             asked = again(bench, base, found.fit, found.named, tell, before=before, every=True)
             found.fit = together(bench, asked)

@@ -72,3 +72,24 @@ def test_a_fit_without_one_name_that_leaves_more_than_no_name_has_failed(monkeyp
     else:
         with pytest.raises(StopIteration):
             again(bench, base, current, names, str, every=True)
+
+
+def test_the_only_name_left_is_asked_over_the_base_where_the_fit_without_it_has_failed(monkeypatch):
+    class AskedError(Exception):
+        pass
+
+    base, sharp = SimpleNamespace(predictions=5.0), SimpleNamespace(predictions=5.0)
+
+    def left_of(_, rest):
+        assert rest is sharp
+        raise AskedError
+
+    monkeypatch.setattr("hdsim.diagnosis.again.without", lambda *_: SimpleNamespace(predictions=90.0))
+    monkeypatch.setattr("hdsim.diagnosis.again.sharpened", lambda _, found: sharp if found is base else None)
+    monkeypatch.setattr("hdsim.diagnosis.again.left_of", left_of)
+    monkeypatch.setattr("hdsim.diagnosis.again._reads", lambda *_: False)
+    added = [SimpleNamespace(effect=RIPPLE, at_limit=False)]
+    current = SimpleNamespace(state=SimpleNamespace(added=added), predictions=1.0)
+    bench = SimpleNamespace(power=lambda predictions: predictions)
+    with pytest.raises(AskedError):
+        again(bench, base, current, [SimpleNamespace(name=RIPPLE)], str, every=True)

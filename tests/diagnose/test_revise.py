@@ -91,3 +91,23 @@ def test_two_names_are_one_only_where_either_alone_explains_each_channel(
     named = [SimpleNamespace(name="unbalance"), SimpleNamespace(name="sensors")]
     others = [fitted(error_alone), fitted(weight_alone)]
     assert stand_ins(bench, fitted((10.0, 100.0)), named, others) == expected
+
+
+def test_what_looked_like_a_name_beside_another_of_the_same_effect_does_not_look_like_that(monkeypatch):
+    """Of two names of one effect the second explains what the first's formula leaves, and so do many."""
+    first = SimpleNamespace(name="unbalance", group={"position_dependent_friction": 1.0}, alike=frozenset())
+    second = SimpleNamespace(name="sensors", group={"damaged_tooth": 1.0}, alike=frozenset())
+    fitted = SimpleNamespace(predictions=1.0)
+    bench = SimpleNamespace(power=lambda predictions: predictions)
+    for name, does in {
+        "without": lambda *_: fitted,
+        "needed": lambda *_: 1.0,
+        "stand_ins": lambda *_: (0, 1),
+        "together": lambda *_: fitted,
+    }.items():
+        monkeypatch.setattr(f"hdsim.diagnosis.revise.{name}", does)
+    named = [first, second]
+    revised(bench, fitted, named, str)
+    assert named == [first]
+    assert first.alike == {"unbalance", "sensors"}
+    assert set(first.group) == {"position_dependent_friction"}
