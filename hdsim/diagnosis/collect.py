@@ -54,7 +54,8 @@ def collect(
     left = last.structured * found.left.power
     project = found.left.project
     shown = shown_in(bench, found.fit)
-    held = _held(bench, predictions) if found.named else HeldOutEvidence()
+    held = _held(bench, predictions["refit"], predictions["after"]) if found.named else HeldOutEvidence()
+    changed = _held(bench, predictions["before"], predictions["after"]) if found.named else HeldOutEvidence()
     may_hold = float(np.clip(held.slope + WORSE * held.spread, 0.0, 1.0))
     power = bench.power(base.fit.predictions)
     return Evidence(
@@ -74,6 +75,7 @@ def collect(
         left=last.structured,
         left_chance=1.0 if only_flanks(bench, left, project) else last.chance,
         held=held,
+        changed=changed,
         patterned=(left + may_hold * max(explained, 0.0)) / max(power, 1e-300),
         rest=None
         if nothing_but_flanks(bench, found.left.power, project)
@@ -118,12 +120,12 @@ def _own_held(bench: Bench, one: Named, predictions: Sequence[Array]) -> HeldOut
         without = turned_to_zero(bench, one.less.state)
     except PredictionError:
         return None
-    return _held(bench, {"refit": without, "after": predictions})
+    return _held(bench, without, predictions)
 
 
-def _held(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> HeldOutEvidence:
-    """How much of what was added shows in held-out data."""
-    slope, spread = borne_out(bench, predictions)
+def _held(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> HeldOutEvidence:
+    """How much of what makes one model another shows in held-out data."""
+    slope, spread = borne_out(bench, before, after)
     return HeldOutEvidence(slope=slope, spread=min(spread, 1e6))
 
 

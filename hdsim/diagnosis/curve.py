@@ -155,7 +155,7 @@ def proved(bench: Bench, without: Fit, curve: CurveFit) -> dict[str, Gap] | None
     """
     align(bench, curve.fit)
     found, there = gaps(bench, {"before": without.state, "refit": without.state, "after": curve.fit.state})
-    slope, _ = borne_out(bench, there)
+    slope, _ = borne_out(bench, there["refit"], there["after"])
     align(bench, without)
     return found if slope >= HALF else None
 

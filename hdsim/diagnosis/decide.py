@@ -155,6 +155,10 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
         ),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
+    # Beside numbers that a re-fit has bent the wrong way an effect may only take back what these did.
+    changed = _held(evidence.changed, rules)
+    if changed < 0.0:
+        found.append(("held-out data show all that was changed", evidence.changed.slope, changed))
     left = law.own_left
     if law.exact and law.own_first:
         left = evidence.left if evidence.left_chance <= rules.chance else 0.0

@@ -127,6 +127,8 @@ class Evidence(Part):
     """Probability to see as much where there is no structure."""
     held: HeldOutEvidence = HeldOutEvidence()
     """What held-out data say of the added effects."""
+    changed: HeldOutEvidence = HeldOutEvidence()
+    """The same of all that the model as given has been changed by, the re-fit of its numbers included."""
     patterned: float = 1.0
     """Share of the re-fitted model's residual that is structure: what is left of it, and of what the added
     effects explain as much as held-out data do not rule out."""

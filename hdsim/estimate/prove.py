@@ -52,8 +52,8 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
     return result, predictions
 
 
-def borne_out(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> tuple[float, float]:
-    """How much of what was added to the re-fitted model shows in held-out data, with its standard error.
+def borne_out(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> tuple[float, float]:
+    """How much of what was added to a model shows in held-out data, with its standard error.
 
     With the held-out residual r and the change d of its prediction, the slope of r over d: 1 where all of d
     is there (and where nothing was added), 0 where none is. The error is clustered over blocks of time: data
@@ -61,14 +61,15 @@ def borne_out(bench: Bench, predictions: Mapping[str, Sequence[Array]]) -> tuple
 
     Args:
         bench: the measured series.
-        predictions: of all series, ``refit`` and ``after``.
+        before: predictions of all series without what was added.
+        after: with it.
     """
-    residuals = [bench.residuals(predictions[stage], drift=True) for stage in ("refit", "after")]
+    residuals = [bench.residuals(predictions, drift=True) for predictions in (before, after)]
     moments, powers = np.zeros(bench.blocks), np.zeros(bench.blocks)
-    for series, before, after in zip(bench.series, *residuals, strict=True):
-        if not len(before):
+    for series, without, there in zip(bench.series, *residuals, strict=True):
+        if not len(without):
             continue
-        r, d = before[series.hold] / series.sigma, (before - after)[series.hold] / series.sigma
+        r, d = without[series.hold] / series.sigma, (without - there)[series.hold] / series.sigma
         moments += np.bincount(series.block[series.hold], r * d, bench.blocks)
         powers += np.bincount(series.block[series.hold], d * d, bench.blocks)
     total, count = float(powers.sum()), int(np.sum(powers > 0))

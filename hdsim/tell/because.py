@@ -37,6 +37,9 @@ WORDINGS = {
     "held-out data show the promised change": Wording(
         "share of its predicted change that held-out data confirm", _part
     ),
+    "held-out data show all that was changed": Wording(
+        "share of what all effects and the re-fit change together that held-out data confirm", _part
+    ),
     "resampled records that it wins": Wording(
         "share of resampled records in which it, or its group, fits best", _part
     ),

@@ -33,7 +33,8 @@ def test_an_error_of_the_outputs_encoder_is_nothing_that_a_motors_unbalance_leav
     assert location.places[0].coordinate == SHARP
     assert location.places[0].channel == "output_angle"
     found = Search(fit, left, [Stage("with it", location, left.power)], [whole.named[k]])
-    gap, predictions = whole.verdict.gap, {"refit": whole.refit.fit.predictions, "after": fit.predictions}
+    before = whole.refit.fit.predictions
+    gap, predictions = whole.verdict.gap, {"before": before, "refit": before, "after": fit.predictions}
     evidence = collect(bench, whole.refit, found, gap, predictions)
     (law,) = evidence.laws
     assert law.own_left < 0.01

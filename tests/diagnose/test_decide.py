@@ -159,6 +159,20 @@ def test_a_later_effect_whose_own_change_held_out_data_do_not_show_is_not_named(
     assert confidence(absent) < 0.5 < confidence(there)
 
 
+def test_a_model_that_predicts_held_out_data_worse_than_the_one_as_given_has_no_names():
+    """An effect may take back what the re-fit had bent, and no more."""
+    taken_back = HeldOutEvidence(slope=0.65, spread=0.03)
+    worse = HeldOutEvidence(slope=-0.25, spread=0.15)
+    given = found(law(), explained=0.97, held=taken_back)
+    assert decide(given).kind == "effect"
+    assert decide(given.model_copy(update={"changed": worse})).kind == "unknown"
+    blunt = HeldOutEvidence(slope=-0.25, spread=3.0)
+    unsure = decide(given.model_copy(update={"changed": blunt}))
+    assert unsure.confidence[0] == pytest.approx(decide(given).confidence[0], rel=0.05)
+    shown = HeldOutEvidence(slope=1.0, spread=0.05)
+    assert decide(given.model_copy(update={"changed": shown})) == decide(given)
+
+
 def test_an_effect_with_which_held_out_data_are_predicted_worse_is_none():
     """A slope below a half is a larger residual than without it, whatever it explains of training data."""
     worse = found(law(), explained=0.97, held=HeldOutEvidence(slope=0.29, spread=0.05))

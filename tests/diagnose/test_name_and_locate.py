@@ -138,8 +138,7 @@ def test_held_out_data_bear_out_the_part_of_a_change_that_is_there(tmp_path, the
     (series,) = bench.series
     wave = np.sin(np.arange(len(series.measured)))
     prediction = series.measured + 3.0
-    found = {"refit": [prediction - there * wave], "after": [prediction + (1.0 - there) * wave]}
-    slope, spread = borne_out(bench, found)
+    slope, spread = borne_out(bench, [prediction - there * wave], [prediction + (1.0 - there) * wave])
     assert slope == pytest.approx(there, abs=0.01)
     assert spread < 0.01
 
@@ -153,12 +152,12 @@ def test_held_out_data_say_how_surely_they_bear_a_change_out(tmp_path):
     slopes, spreads = [], []
     for _ in range(200):
         prediction = series.measured + 2.0 * rng.standard_normal(samples)
-        slope, spread = borne_out(bench, {"refit": [prediction - wave], "after": [prediction]})
+        slope, spread = borne_out(bench, [prediction - wave], [prediction])
         slopes.append(slope)
         spreads.append(spread)
     assert np.mean(slopes) == pytest.approx(1.0, abs=4 * np.std(slopes) / np.sqrt(200))
     assert np.mean(spreads) == pytest.approx(np.std(slopes), rel=0.2)
-    assert borne_out(bench, {"refit": [series.measured], "after": [series.measured]}) == (1.0, np.inf)
+    assert borne_out(bench, [series.measured], [series.measured]) == (1.0, np.inf)
 
 
 def test_of_two_that_explain_the_same_the_simpler_one_has_the_name():

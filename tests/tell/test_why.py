@@ -53,7 +53,9 @@ def test_every_reason_is_on_the_terminal(kind):
 
 
 def test_what_decide_asks_has_plain_words():
-    two = EFFECT.model_copy(update={"laws": [law(at_limit=True), law("unbalance", needed=0.9)]})
+    worse = HeldOutEvidence(slope=-0.2, spread=0.1)
+    laws = [law(at_limit=True), law("unbalance", needed=0.9)]
+    two = EFFECT.model_copy(update={"laws": laws, "changed": worse})
     asked = [*decide(two).because, *decide(NOTHING).because, *decide(UNKNOWN).because]
     assert {reason.rule for reason in asked} - {LIKELY} == set(WORDINGS)
 
