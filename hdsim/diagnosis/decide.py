@@ -160,7 +160,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     if changed < 0.0:
         found.append(("held-out data show all that was changed", evidence.changed.slope, changed))
     left = law.own_left
-    if law.exact and law.own_first:
+    if law.exact and law.own_first and law.own_left > rules.exactly:
         left = evidence.left if evidence.left_chance <= rules.chance else 0.0
     found.append(
         (

@@ -49,6 +49,12 @@ class Rules(Part):
         "for all of what an exact formula leaves being structure: a cable is no unbalance",
         "5 % of the first matrix, seeds 100-502",
     )
+    exactly: float = _rule(
+        0.02,
+        "1",
+        "part of what an exact formula explains that may be left in its own coordinate: a machine has more there",
+        "chosen: as little as within which two effects count as the same trace",
+    )
     limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
     later: float = _rule(-1.4, "log odds", "for each effect beside the first", BY)
     repeats: float = _rule(

@@ -181,6 +181,19 @@ def test_an_effect_with_which_held_out_data_are_predicted_worse_is_none():
     assert decide(blunt).kind == "effect"
 
 
+@pytest.mark.parametrize(
+    ("own_left", "kind"),
+    [
+        (0.008, "effect"),  # a rotor's unbalance on a real joint that has small errors of its own over the angle
+        (0.056, "unknown"),  # a cable that an unbalance stands in for
+    ],
+)
+def test_an_exact_formula_may_leave_what_a_real_machine_has_beside_it(own_left, kind):
+    exact = law("unbalance", exact=True, own_first=True, own_left=own_left)
+    rest = RestEvidence(record="a", channel="b", times_noise=3.0)
+    assert decide(found(exact, left=0.3, patterned=0.9, rest=rest, rest_before=rest)).kind == kind
+
+
 @pytest.mark.parametrize(("times_noise", "kind"), [(1.018, "nothing"), (1.1, "unknown")])
 def test_structure_that_only_means_of_many_readings_show_is_nothing_that_is_missing(times_noise, kind):
     """A drive without an effect against a locked output: 12 % of what the means of four readings leave."""
