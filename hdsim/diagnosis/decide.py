@@ -132,15 +132,19 @@ def probability(evidence: Evidence, k: int, rules: Rules, because: list[Reason])
 def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, float]]:
     """Each piece of evidence on an effect: what it is, what was seen, its weight in log odds."""
     law = evidence.laws[k]
-    # What is left elsewhere than in its own coordinate is another effect's, and counts half.
-    seen = 0.5 * (_log_odds(evidence.explained) + _log_odds(1.0 - law.own_left))
-    explained = rules.explained * (seen - _log_odds(rules.explained_even))
     # Each is asked what held-out data show of its own. A later one that is no line is bent to what is left,
     # and so to much of what is left elsewhere: for it they only speak against.
     held_out = law.held if law.held is not None else evidence.held
     held = rules.held * _held(held_out, rules)
     # A sharp line that data hold which no step has seen is none that the search has chosen of many.
-    repeats = law.sharp and law.held is not None and _repeats(law.held, rules)
+    line = law.sharp and _repeats(held_out, rules)
+    repeats = line and law.held is not None
+    # What is left elsewhere than in its own coordinate is another effect's, and counts half; whole where all
+    # names together explain less than they leave: they may well be bent to a part of what has no name.
+    seen = _log_odds(evidence.explained)
+    if evidence.explained >= rules.explained_most or line:
+        seen = 0.5 * (seen + _log_odds(1.0 - law.own_left))
+    explained = rules.explained * (seen - _log_odds(rules.explained_even))
     found = [
         # What all explain together speaks for the first; of a later one it only says that all are too little.
         (

@@ -46,18 +46,13 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
         for k, one in enumerate(named):
             tell(f"without {one.name}")
             rest = without(bench, current, k)
-            one.needed, one.worth = 1.0, math.inf
-            if rest is not None:
-                one.needed = needed(bench, rest, current)
-                if len(named) > 2 and one.needed >= NEEDLESS:
-                    # Of two names neither can have been needed for the sake of the other alone.
-                    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-                        rest = settled(bench, rest)
-                    one.needed = needed(bench, rest, current)
-                one.worth = bench.power(rest.predictions) - bench.power(current.predictions)
-            one.less = rest
+            one.needed = 1.0 if rest is None else needed(bench, rest, current)
             others.append(rest)
-        k = min(range(len(named)), key=lambda k: named[k].needed)
+        k = _least_needed(bench, current, named, others)
+        for one, rest in zip(named, others, strict=True):
+            one.less, one.worth = rest, math.inf
+            if rest is not None:
+                one.worth = bench.power(rest.predictions) - bench.power(current.predictions)
         left_out = others[k]
         if left_out is None or named[k].needed >= NEEDLESS:
             alike = stand_ins(bench, current, named, others)
@@ -73,6 +68,30 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
     if len(named) == 1:
         named[0].needed, named[0].less = 1.0, None
     return current
+
+
+def _least_needed(bench: Bench, current: Fit, named: Sequence[Named], others: list[Fit | None]) -> int:
+    """Which name is needed least, or one that is needless.
+
+    Of two names neither can have been needed for the sake of the other alone. Of more, the models without are
+    carried on to their ends, which makes each name needed less, until one is needless.
+
+    Args:
+        bench: the measured series.
+        current: the model with all names.
+        named: in the order of ``current.state.added``; ``needed`` is changed in place.
+        others: the model without each, rough; changed in place.
+    """
+    rough = sorted(range(len(named)), key=lambda k: named[k].needed) if len(named) > 2 else []
+    for k in rough:
+        rest = others[k]
+        if rest is not None and named[k].needed >= NEEDLESS:
+            with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+                others[k] = rest = settled(bench, rest)
+            named[k].needed = needed(bench, rest, current)
+        if named[k].needed < NEEDLESS:
+            return k
+    return min(range(len(named)), key=lambda k: named[k].needed)
 
 
 def stand_ins(

@@ -28,6 +28,12 @@ class Rules(Part):
         1.94, "log odds per log odds", "weight of the part of all structure that the names explain", BY
     )
     explained_even: float = _rule(0.7, "1", "part of the structure at which that is neutral", "chosen")
+    explained_most: float = _rule(
+        0.5,
+        "1",
+        "part of the structure below which what is left elsewhere than in a name's own coordinate counts whole",
+        "a principle: more is left than is explained",
+    )
     held: float = _rule(
         0.7, "log odds per log odds", "weight of the odds that held-out data give for the effects", BY
     )

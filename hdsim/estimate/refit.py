@@ -246,9 +246,9 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
     readings = replace(found, undetermined=[f for f in found.undetermined if f.reading], beside=None)
     # A number that a missing effect has driven to nearly nothing leaves no slope to come back by.
     far = {f.name: f.none for f in frees if not f.step and abs(f.none) > FAR * f.prior}
-    whole = fit(bench, state or found.state, frees, after=readings, rough=rough)
+    whole = fit(bench, state or found.state, frees, after=readings, rough=True)
     if far and bench.power(whole.predictions) > REACHED * sum(bench.noise_powers.values()):
-        other = fit(bench, state or found.state, frees, theta=far, after=readings, rough=rough)
+        other = fit(bench, state or found.state, frees, theta=far, after=readings, rough=True)
         whole = min(whole, other, key=lambda each: unlikelihood(bench, each, whole))
     if rough:
         return whole
@@ -257,6 +257,8 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
         # What was left as given holds what it is tied to where the data would have moved both. At the end all
         # numbers share by their priors, and none seems known because another was held.
         whole = fit(bench, whole.state, [*at_present(whole), *left], prune=False, after=readings)
+    else:
+        whole = settled(bench, whole)
     _widened(bench, whole)
     widen_by_flanks(bench, whole)
     return whole

@@ -39,6 +39,23 @@ def test_what_another_missing_effect_leaves_does_not_take_a_name_away():
     assert decide(found(law("input_coulomb_viscous"), explained=0.5, held=held)).kind == "effect"
 
 
+@pytest.mark.parametrize(
+    ("explained", "sharp", "kind"),
+    [
+        (0.12, False, "unknown"),  # a mesh loss that stands in for a part of what a motor's saturation does
+        (0.12, True, "effect"),  # a line in an order spectrum that held-out data repeat
+        (0.67, False, "effect"),  # most of what is missing
+    ],
+)
+def test_a_name_that_explains_less_than_it_leaves_is_none(explained, sharp, kind):
+    beside = {
+        "held": HeldOutEvidence(slope=0.9, spread=0.05),
+        "rest": RestEvidence(record="a", channel="b", times_noise=29.0),
+    }
+    beside |= {"rest_before": beside["rest"], "left": 0.7}
+    assert decide(found(law(sharp=sharp), explained=explained, **beside)).kind == kind
+
+
 def test_held_out_data_that_hardly_excite_an_effect_do_not_judge_it():
     silent = found(law(), held=HeldOutEvidence(slope=-1.25, spread=3.0))
     without = found(law(), held=HeldOutEvidence(slope=0.5, spread=3.0))
@@ -184,7 +201,10 @@ def test_an_effect_with_which_held_out_data_are_predicted_worse_is_none():
 @pytest.mark.parametrize(
     ("own_left", "kind"),
     [
-        (0.008, "effect"),  # a rotor's unbalance on a real joint that has small errors of its own over the angle
+        (
+            0.008,
+            "effect",
+        ),  # a rotor's unbalance on a real joint that has small errors of its own over the angle
         (0.056, "unknown"),  # a cable that an unbalance stands in for
     ],
 )
