@@ -45,9 +45,9 @@ SEEN = 0.5
 SAME = 0.02
 #: The same for effects that are known to look alike, when neither reaches the noise.
 MISMATCH = 0.1
-#: Part of what the best one explains that another must explain to be a name of the same, however few blocks of
-#: time tell the two apart (calibration cases: of the 13 in which the truth was such another name it explained
-#: 0.6 to 1, and 0.1 where the best was taken back later).
+#: Part of what the best one explains that another must explain to be a name of the same, however few blocks
+#: of time tell the two apart (calibration cases: of the 13 in which the truth was such another name it
+#: explained 0.6 to 1, and 0.1 where the best was taken back later).
 HALF = 0.5
 
 

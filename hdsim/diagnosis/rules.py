@@ -31,7 +31,7 @@ class Rules(Part):
     explained_most: float = _rule(
         0.5,
         "1",
-        "part of the structure below which what is left elsewhere than in a name's own coordinate counts whole",
+        "part of the structure below which what is left in other coordinates than a name's counts whole",
         "a principle: more is left than is explained",
     )
     held: float = _rule(
@@ -58,8 +58,8 @@ class Rules(Part):
     exactly: float = _rule(
         0.02,
         "1",
-        "part of what an exact formula explains that may be left in its own coordinate: a machine has more there",
-        "chosen: as little as within which two effects count as the same trace",
+        "part of what an exact formula explains that it may leave in its own coordinate",
+        "chosen: as for two effects that count as the same trace; a machine has errors of its own there",
     )
     limit: float = _rule(-3.0, "log odds", "for a number at the end of its range", "chosen")
     later: float = _rule(-1.4, "log odds", "for each effect beside the first", BY)

@@ -60,13 +60,43 @@ def offsets_of(
             weight = float(one.train.sum()) / one.sigma**2
             common, weights = common + weight * means[k], weights + weight
         for k, mean in means.items():
-            if weights == 0.0 or len(means) == 1:
+            if weights == 0.0 or len(means) == 1 or series[k].own_zero:
                 found[k] = mean  # nobody shares it, or only the proof sees this channel
                 continue
             zero = common / weights
-            bound = DRIFT * series[k].noise if drift else 0.0
+            bound = DRIFT * series[k].reading if drift else 0.0
             found[k] = zero + float(np.clip(mean - zero, -bound, bound))
     return found
+
+
+def part_zeros(
+    series: Sequence[Series], values: Sequence[Array], zeros: Zeros, speeds: Sequence[Array]
+) -> None:
+    """Let zeros of a channel differ in fits where what they do is no more than they drift, and tells nothing.
+
+    Records that each pass through more speeds than lie between them (analysis of variance) tell friction,
+    weight and inertia by themselves. What their means differ by is the sensor's, as long as nobody would see
+    it in a record; of means of many readings a fit would make numbers of it. At constant speeds it is
+    friction.
+
+    Args:
+        series: all of them; ``own_zero`` is set.
+        values: what is measured less predicted, shape (n,) each, or (0,) where nothing was predicted.
+        zeros: which of them share one.
+        speeds: the motor's velocity in each training record, (n,).
+    """
+    within = float(np.mean([np.var(speed) for speed in speeds]))
+    swings = within > float(np.var([np.mean(speed) for speed in speeds]))
+    for group in groups(series, zeros):
+        seen = [k for k in group if series[k].record < len(speeds) and series[k].train.any()]
+        means = [float(values[k][series[k].train].mean()) for k in seen]
+        weights = [float(series[k].train.sum()) / series[k].noise ** 2 for k in seen if series[k].noise > 0.0]
+        alike = len(seen) > 1 and len(weights) == len(seen)
+        if alike:
+            zero = float(np.average(means, weights=weights))
+            alike = all(abs(m - zero) < DRIFT * series[k].reading for k, m in zip(seen, means, strict=True))
+        for k in seen:
+            series[k].own_zero = swings and alike
 
 
 def offset_columns(series: Sequence[Series], training: int, zeros: Zeros) -> Array:
@@ -80,7 +110,8 @@ def offset_columns(series: Sequence[Series], training: int, zeros: Zeros) -> Arr
     seen = [k for k, one in enumerate(series) if one.record < training]
     sizes = {k: int(series[k].train.sum()) for k in seen}
     columns = []
-    for group in groups(series, zeros):
+    shared = [[k for k in group if not series[k].own_zero] for group in groups(series, zeros)]
+    for group in [*shared, *([k] for k in seen if series[k].own_zero)]:
         if not any(sizes.get(k) for k in group):
             continue
         least = min(series[k].sigma for k in group if k in sizes)
@@ -108,6 +139,7 @@ def drift_columns(series: Sequence[Series], training: int, zeros: Zeros) -> tupl
     columns, spreads = [], []
     for group in groups(series, zeros):
         own = [k for k in group if k in first and series[k].train.any() and series[k].reading > 0.0]
+        own = [k for k in own if not series[k].own_zero]
         weights = np.array([series[k].train.sum() / series[k].sigma ** 2 for k in own])
         for k, part in zip(own, weights / weights.sum(), strict=True) if len(own) > 1 else ():
             column = np.zeros(rows)

@@ -16,6 +16,7 @@ from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled, st
 from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
 from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
+from hdsim.estimate.offsets import part_zeros
 from hdsim.estimate.records import Array
 from hdsim.estimate.standstill import hear_standstill
 from hdsim.estimate.state import State
@@ -168,6 +169,8 @@ def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
 def _roughly(bench: Bench, state: State, freedoms: Sequence[Free]) -> tuple[list[Array], Fit]:
     """Predictions of the model as given, and a first fit."""
     before = bench.predict(state)
+    speeds = [predictor.motor_velocity for predictor in bench.predictors[: bench.training]]
+    part_zeros(bench.series, bench.apart(before), bench.zeros, speeds)
     bench.weigh(bench.residuals(before))
     found = fit(bench, state, freedoms, evaluations=5, rough=True)
     align(bench, found)

@@ -24,6 +24,7 @@ class Series:
         noise: standard deviation of the channel's noise.
         reading: the same of a single reading, where a sample is the mean of several.
         sigma: standard deviation by which residuals are divided.
+        own_zero: whether a fit lets its zero differ from those of other records.
     """
 
     record: int
@@ -35,3 +36,4 @@ class Series:
     noise: float
     reading: float
     sigma: float = 1.0
+    own_zero: bool = False

@@ -5,7 +5,7 @@ import pytest
 
 import hdsim
 from hdsim.diagnosis.workflow import diagnose
-from hdsim.estimate.offsets import offsets_of
+from hdsim.estimate.offsets import drift_columns, offset_columns, offsets_of, part_zeros
 from hdsim.estimate.records import Record
 
 RATIO = 100.0
@@ -74,6 +74,7 @@ def test_motion_in_one_direction_is_said_to_leave_coulomb_friction_open(base):
 class _Series:
     def __init__(self, record, channel, n=10, noise=0.1, sigma=1.0):
         self.record, self.channel, self.noise, self.sigma = record, channel, noise, sigma
+        self.reading, self.own_zero = noise, False
         self.train, self.hold = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
 
 
@@ -84,6 +85,35 @@ def test_a_torque_has_one_zero_and_an_angle_one_for_each_record():
     assert offsets_of(series, values, "record", drift=False) == [1.0, 3.0, 1.0, 3.0]
     # A torque's zero may move by twice its noise between records.
     assert offsets_of(series, values, "campaign", drift=True) == pytest.approx([1.8, 2.2, 1.0, 3.0])
+
+
+def test_a_zero_drifts_by_the_noise_of_a_reading_however_many_a_sample_is_the_mean_of():
+    series = [_Series(r, "motor_torque", noise=0.1) for r in (0, 1)]
+    for one in series:
+        one.reading = 0.4  # means of 16
+    values = [np.full(10, 1.0), np.full(10, 3.0)]
+    assert offsets_of(series, values, "campaign", drift=True) == pytest.approx([1.2, 2.8])
+
+
+@pytest.mark.parametrize(
+    ("apart", "speeds", "parted"),
+    [
+        (0.15, ("swing", "swing"), True),  # nobody would see it in a record
+        (0.25, ("swing", "swing"), False),  # more than zeros drift
+        (0.15, ("slow", "fast"), False),  # at constant speeds it is friction
+    ],
+)
+def test_zeros_part_where_records_tell_friction_by_themselves(apart, speeds, parted):
+    series = [_Series(r, "motor_torque", noise=0.1) for r in (0, 1)]
+    values = [np.full(10, 1.0 - apart), np.full(10, 1.0 + apart)]
+    motions = {"swing": 10.0 * np.sin(np.arange(10)), "slow": np.full(10, 1.0), "fast": np.full(10, 20.0)}
+    part_zeros(series, values, "campaign", [motions[speed] for speed in speeds])
+    assert [one.own_zero for one in series] == [parted, parted]
+    zeros = offsets_of(series, values, "campaign", drift=False)
+    assert zeros == pytest.approx([1.0 - apart, 1.0 + apart] if parted else [1.0, 1.0])
+    # What a shift of each zero does is one column each, or one of both.
+    assert offset_columns(series, 2, "campaign").shape == (20, 2 if parted else 1)
+    assert drift_columns(series, 2, "campaign")[0].shape == (20, 0 if parted else 2)
 
 
 def test_a_zero_is_weighed_as_the_fit_weighs_it():
