@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
 
-from hdsim.diagnosis.revise import NEEDLESS, needed, revised, stand_ins
+from hdsim.diagnosis.revise import NEEDLESS, _least_needed, needed, revised, stand_ins
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.refit import together
 
@@ -111,3 +111,28 @@ def test_what_looked_like_a_name_beside_another_of_the_same_effect_does_not_look
     assert named == [first]
     assert first.alike == {"unbalance", "sensors"}
     assert set(first.group) == {"position_dependent_friction"}
+
+
+@pytest.mark.parametrize(
+    ("rough", "at_the_end", "settled", "least"),
+    [
+        ((0.9, 0.05, 0.8), (0.9, 0.01, 0.8), [], 1),  # needless already: nobody need go on
+        ((0.9, 0.3, 0.8), (0.9, 0.05, 0.02), [1], 1),  # the first that turns out needless
+        ((0.9, 0.3, 0.8), (0.9, 0.3, 0.05), [1, 2], 2),
+        ((0.9, 0.3, 0.8), (0.2, 0.3, 0.8), [1, 2, 0], 0),  # none is, and all have been asked
+    ],
+)
+def test_models_without_a_name_are_carried_on_until_one_is_needless(
+    monkeypatch, rough, at_the_end, settled, least
+):
+    gone_on = []
+
+    def to_its_end(_, k):
+        gone_on.append(k)
+        return k
+
+    monkeypatch.setattr("hdsim.diagnosis.revise.settled", to_its_end)
+    monkeypatch.setattr("hdsim.diagnosis.revise.needed", lambda _, k, __: at_the_end[k])
+    named = [SimpleNamespace(needed=part) for part in rough]
+    assert _least_needed(None, None, named, [0, 1, 2]) == least
+    assert gone_on == settled
