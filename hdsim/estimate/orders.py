@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -23,6 +24,11 @@ QUICKEST = 0.6
 SPECTRUM_SAMPLES = 8000
 #: Share of a channel's residual that a line of an order spectrum must hold to be listed.
 LEAST_LINE = 0.02
+
+
+#: Beats of two lines in a record for them to be two, one (Rayleigh) less what refining may err by: with fewer
+#: the second is what the first one's amplitude changes by, as with speed.
+APART = 0.9
 
 
 @dataclass(frozen=True)
@@ -61,11 +67,12 @@ def order_lines(
         return []
     waves = np.exp(-1j * np.outer(orders, theta))
     lines: list[Line] = []
+    refused: list[float] = []
     rest = e
     while len(lines) < most:
         shares = 2.0 * np.abs(waves @ rest / len(rest)) ** 2 / power
-        for near in (np.abs(orders - line.order) < 1.0 / turns for line in lines):
-            shares[near] = 0.0
+        for order in (*(line.order for line in lines), *refused):
+            shares[np.abs(orders - order) < 1.0 / turns] = 0.0
         k = int(np.argmax(shares))
         if shares[k] < max(LEAST_LINE, 10.0 * float(np.median(shares))):
             break
@@ -75,6 +82,9 @@ def order_lines(
             alone, _ = _without(theta, e, found[:j] + found[j + 1 :])
             found[j] = _refined(theta, alone, found[j], 0.25 / turns)
         found = [_whole(order, turns) for order in found]
+        if min(np.diff(sorted(found)), default=math.inf) < APART / turns:
+            refused.append(float(orders[k]))
+            continue
         # The next one is looked for in what all lines so far leave, so that no side lobe is taken for a line.
         rest, sizes = _without(theta, e, found)
         lines = [

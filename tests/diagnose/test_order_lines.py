@@ -34,6 +34,25 @@ def test_a_loop_over_part_of_a_turn_is_no_line():
     assert order_lines(bench_of(time, angle, loop), [loop], "motor_torque") == []
 
 
+def test_an_order_that_grows_with_speed_is_one_line():
+    """In 72 turns of a move from rest to rest; two orders that beat 1.4 times in them are two."""
+    time = np.arange(3600) / 500.0
+    angle = 72.0 * 2.0 * np.pi * (time / 7.2 - np.sin(2.0 * np.pi * time / 7.2) / (2.0 * np.pi))
+    speed = 1.0 - np.cos(2.0 * np.pi * time / 7.2)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(len(time))
+
+    def orders(error):
+        lines = order_lines(bench_of(time, angle, error), [error], "motor_torque")
+        return sorted(line.order for line in lines)
+
+    grown = orders(0.1 * speed**2 * np.sin(4 * angle) + noise)
+    assert 4.0 in grown
+    assert np.all(np.diff(grown) > 0.9 / 72.0)
+    assert orders(0.1 * np.sin(2.0 * angle) + 0.1 * np.sin(1.98 * angle + 1.0) + noise) == pytest.approx(
+        [1.98, 2.0], abs=0.003
+    )
+
+
 def test_an_order_just_beyond_half_the_sample_rate_is_that_order():
     """Read as 110 Hz of 140, which at 14 turns a second is no whole order."""
     time = np.arange(1800) / 250.0
