@@ -24,9 +24,9 @@ QUICKEST = 0.6
 SPECTRUM_SAMPLES = 8000
 #: Share of a channel's residual that a line of an order spectrum must hold to be listed.
 LEAST_LINE = 0.02
-#: Beats of two lines in a record for them to be two, one (Rayleigh) less what refining may err by: with fewer
-#: the second is what the first one's amplitude changes by, as with speed.
-APART = 0.9
+#: Beats of two lines in a record for them to be two: they are looked for one apart (Rayleigh), and refining
+#: moves the second by a quarter. With fewer it is what the first one's amplitude changes by, as with speed.
+APART = 0.75
 
 
 @dataclass(frozen=True)
