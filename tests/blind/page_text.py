@@ -76,11 +76,11 @@ page of this version none is left out. Of its test cases (seed 19, from number 1
 `teeth`: seed 17) none had been looked into when they were run: in the order of their numbers, as many as time
 allowed. Of this version are those of `real` from 90 on, which had been run once before, with lines in order
 spectra apart from 0.9 of a beat on (34 of 36 were right), and but for that the others from 57 on (from 52 on
-with lines of any distance); those from 43 and 72 on are of the version before, whose groups still held names of
-effects that had been dropped; the others and `teeth` of the one before that, whose noise still held quick
+with lines of any distance); those from 43 and 72 on are of the version before, whose groups still held names
+of effects that had been dropped; the others and `teeth` of the one before that, whose noise still held quick
 orders. Those of `real` up to 71 had been run twice before, with the first versions of how repeated rows are
-treated and of how finely a motion is followed; their outcomes were seen. The calibration cases are of older
-searches.
+treated and of how finely a motion is followed; their outcomes were seen. The calibration cases are of
+older searches.
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, with their evidence: `python tests/blind
 page` generates the page from them, and `decide` can judge every one again.
