@@ -59,11 +59,13 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
             # A plain formula may have bent the base to stand in for what it lacks.
             ways += [(given, [*others, one]) for one in _nearest(bench, given, begins)]
         ends = _at_their_ends(bench, ways)
+        # At the end of a range its further numbers are told no more.
+        inside = [found for found in ends if not found.state.added[-1].at_limit]
+        if inside:
+            inside += _with_fewer(bench, min(inside, key=lambda found: bench.power(found.predictions)))
         # The plain one may not have been at its end.
         as_it_is = _at_their_ends(bench, [(current, [*others, plain])])
     plain_end = as_it_is[0] if as_it_is else current
-    # At the end of a range its further numbers are told no more.
-    inside = [found for found in ends if not found.state.added[-1].at_limit]
     least = min([plain_end, *inside], key=lambda found: bench.power(found.predictions))
     rest, blocks = bench.stacked(bench.residuals(least.predictions)), bench.stacked_blocks()
     sample, number = bench.sample_power(rest), worth_of_a_number(rest, blocks)
@@ -88,8 +90,14 @@ def each_refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], ob
 
 
 def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
-    """An effect in the finer of its formulas, as large as it is: their further terms at none."""
+    """An effect in the others of its finer formulas, as large as it is: their further terms at none.
+
+    Of one that is finer already those that need less, with its shapes.
+    """
     finer: tuple[Fitting, ...] = catalogue()[plain.effect].finer
+    is_finer = any(fitting.label == plain.fitting.label for fitting in finer)
+    paths = (shape.path for shape in plain.fitting.shapes)
+    own = dict(zip(paths, plain.shapes, strict=True)) if is_finer else {}
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
             continue
@@ -99,7 +107,17 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
             coefficients: list[float] = []
             for term, part in one.fitting.parts(()):
                 coefficients += [term.read(plain.settings())] * (part.stop - part.start)
-            yield replace(one, coefficients=tuple(coefficients))
+            shapes = (own.get(x.path, start) for x, start in zip(fitting.shapes, one.shapes, strict=True))
+            if not is_finer or one.freedom < plain.freedom:
+                yield replace(one, coefficients=tuple(coefficients), shapes=tuple(shapes))
+
+
+def _with_fewer(bench: Bench, found: Fit) -> list[Fit]:
+    """Fits of formulas with fewer numbers from where that with more is: they may not have come as far."""
+    *others, finer = found.state.added
+    begins = list(_begins(bench, found, finer))
+    ends = _at_their_ends(bench, [(found, [*others, one]) for one in _nearest(bench, found, begins)])
+    return [end for end in ends if not end.state.added[-1].at_limit]
 
 
 def _nearest(bench: Bench, current: Fit, begins: Sequence[Added]) -> list[Added]:

@@ -1,6 +1,7 @@
 """A play that has its name, in the formula of many teeth where the data tell it, and only there."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from diagnose_bench import servo_with_arm
 
 import hdsim
+from hdsim.diagnosis import finer
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
@@ -17,7 +19,7 @@ from hdsim.estimate.fit import Fit, at_present, fit
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, together
-from hdsim.estimate.state import state_of
+from hdsim.estimate.state import Added, state_of
 from hdsim.scenario import Scenario
 
 PLAY = "output_backlash"
@@ -105,6 +107,20 @@ def test_gaps_that_differ_are_told_where_their_waves_are_none() -> None:
     assert beyond(bench, found) < 0.1
     assert found.state.added[0].fitting.label == "of gaps that differ"
     assert found.state.added[0].settings()["gap_spread"] == pytest.approx(0.9, abs=0.05)
+
+
+@pytest.mark.slow
+def test_gaps_that_differ_are_asked_from_where_many_teeth_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stuck(bench: Bench, ways: Sequence[tuple[Fit, list[Added]]]) -> list[Fit]:
+        """Where several begin, the formula with fewer numbers comes to nothing."""
+        ends = to_their_ends(bench, ways)
+        return [end for end in ends if len(ways) == 1 or end.state.added[-1].fitting.turns]
+
+    to_their_ends = finer._at_their_ends
+    monkeypatch.setattr(finer, "_at_their_ends", stuck)
+    gaps = {"backlash_arcmin": 1.2, "gap_spread": 0.9, "uptake_torque_nm": 8.0}
+    found = refined(*with_play(LUMPED, {PLAY: gaps}, label="taken up gradually"), lambda _: None)
+    assert found.state.added[0].fitting.label == "of gaps that differ"
 
 
 @pytest.mark.slow
