@@ -62,11 +62,7 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
     because: list[Reason] = []
     confidence = [probability(evidence, k, rules, because) for k in range(len(evidence.laws))]
     names = [k for k, p in enumerate(confidence) if p >= rules.believed]
-    for k, p in enumerate(confidence):
-        name = evidence.laws[k].name
-        because.append(
-            Reason(rule="likely enough for a name", of=name, seen=p, limit=rules.believed, holds=k in names)
-        )
+    because += [_likely(evidence, k, p, rules) for k, p in enumerate(confidence)]
     if names:
         return Decision(
             kind="effect",
@@ -111,6 +107,18 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
     )
     kind: Kind = "parameter" if fell else "nothing"
     return Decision(kind=kind, confidence=confidence, certainty=rules.nothing, because=because)
+
+
+def reasons_of(evidence: Evidence, k: int, rules: Rules = RULES) -> list[Reason]:
+    """Every rule that was asked of one effect of the evidence, with what was seen."""
+    because: list[Reason] = []
+    p = probability(evidence, k, rules, because)
+    return [*because, _likely(evidence, k, p, rules)]
+
+
+def _likely(evidence: Evidence, k: int, p: float, rules: Rules) -> Reason:
+    enough, name = p >= rules.believed, evidence.laws[k].name
+    return Reason(rule="likely enough for a name", of=name, seen=p, limit=rules.believed, holds=enough)
 
 
 def probability(evidence: Evidence, k: int, rules: Rules, because: list[Reason]) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from hdsim.diagnosis.collect import collect
 from hdsim.diagnosis.curve import CurveFit, fit_curve, proved
-from hdsim.diagnosis.decide import Decision, decide
+from hdsim.diagnosis.decide import Decision, Reason, decide, reasons_of
 from hdsim.diagnosis.discrepancy import discrepancy
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.growth import tracked
@@ -190,7 +190,7 @@ def _diagnosed(
             least = min(range(len(found.named)), key=judged.decision.confidence.__getitem__)
             found = taken_back(bench, found, least, tell_of)
             less = _judged(bench, base, found, start)
-            less.of_others(judged)
+            less.instead_of(judged, least)
             judged = less
     if not (judged.decision.names or whole[1].decision.names):
         found, judged = whole  # of several names that are none, what they explain together says most
@@ -248,7 +248,7 @@ def _diagnosed(
         "data_problems": [DataProblem(**vars(problem)) for problem in problems],
         "not_tried": found.stages[0].screening.skipped if found.stages[0].screening else {},
         "confidence": decision.certainty,
-        "because": decision.because,
+        "because": [*decision.because, *judged.taken_back],
         "remains": rest,
         "curve": curve.found() if curve is not None else None,
         "readings": readings,
@@ -290,12 +290,17 @@ class _Judged:
     predictions: dict[str, list[Array]]
     evidence: Evidence
     decision: Decision
+    taken_back: list[Reason] = field(default_factory=list)
 
-    def of_others(self, before: _Judged) -> None:
-        """Keep why a name was taken back, as it was judged before."""
-        own = Counter(law.name for law in self.evidence.laws)
-        gone = {law.name for law in before.evidence.laws if not own[law.name]}
-        self.decision.because += [reason for reason in before.decision.because if reason.of in gone]
+    def instead_of(self, before: _Judged, least: int) -> None:
+        """Keep why names were taken back, the ``least``-th among them, as they were judged before."""
+        left, laws = Counter(law.name for law in self.evidence.laws), before.evidence.laws
+        self.taken_back = list(before.taken_back)
+        for k in sorted(range(len(laws)), key=lambda k: k == least):
+            if left[laws[k].name]:
+                left[laws[k].name] -= 1
+            else:
+                self.taken_back += reasons_of(before.evidence, k)
 
 
 def _judged(bench: Bench, base: Refit, found: Search, start: State) -> _Judged:

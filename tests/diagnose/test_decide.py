@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from hdsim.diagnosis.decide import decide, weighed
 from hdsim.diagnosis.evidence import Evidence, HeldOutEvidence, LawEvidence, RestEvidence
 from hdsim.diagnosis.rules import RULES, Rules
+from hdsim.diagnosis.workflow import _Judged
 
 
 def law(name: str = "kinematic_error", **changes) -> LawEvidence:
@@ -219,3 +220,25 @@ def test_structure_that_only_means_of_many_readings_show_is_nothing_that_is_miss
     """A drive without an effect against a locked output: 12 % of what the means of four readings leave."""
     rest = RestEvidence(record="a", channel="b", times_noise=times_noise)
     assert decide(Evidence(left=0.1204, left_chance=0.0025, rest=rest)).kind == kind
+
+
+def test_why_names_were_taken_back_is_kept_though_another_of_that_name_stays():
+    weak = law(sharp=True, needed=0.1, own_left=0.3, held=HeldOutEvidence(slope=0.1, spread=0.05))
+
+    def judged(*laws: LawEvidence) -> _Judged:
+        evidence = found(*laws, held=HeldOutEvidence(slope=0.95, spread=0.01))
+        return _Judged({}, {}, evidence, decide(evidence))
+
+    first, second, last = judged(law(), weak, law("stribeck_friction")), judged(law(), weak), judged(law())
+    second.instead_of(first, 2)
+    last.instead_of(second, 1)
+    likely = [(r.of, r.seen) for r in last.taken_back if r.rule == "likely enough for a name"]
+    confidence = first.decision.confidence
+    assert likely == [
+        ("stribeck_friction", confidence[2]),
+        ("kinematic_error", second.decision.confidence[1]),
+    ]
+    # Of what they were judged by, nothing is missing.
+    assert (
+        sum(r.of == "kinematic_error" for r in last.taken_back) == len(weighed(second.evidence, 1, RULES)) + 1
+    )
