@@ -23,6 +23,7 @@ from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, Named, name_effect
 from hdsim.diagnosis.revise import revised
 from hdsim.diagnosis.screen import LEVEL, Residual
+from hdsim.diagnosis.swing import hear_swing
 from hdsim.diagnosis.traces import Screening, ranked_anew, screen
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
@@ -62,16 +63,22 @@ class Search:
     named: list[Named] = field(default_factory=list)
 
 
-def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Search:
+def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Search | None:
     """Add effects until nothing significant is left.
 
     Args:
         bench: the measured series, weighed.
         base: the re-fitted model.
         during: told the step that begins and what it does; returns who is told the details.
+
+    Returns:
+        None where a vibration at the beginning of a record was behind the first effects: it does not count
+            any more, and all begins anew.
     """
     found = Search(base, left_of(bench, base))
     while True:
+        if found.named and hear_swing(bench, found.fit):
+            return None
         following = _next(bench, base, found, during)
         if following is not None:
             found.fit = following

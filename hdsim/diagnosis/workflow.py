@@ -176,8 +176,15 @@ def _diagnosed(
         running.enter_context(step(name, text))
         return tell
 
-    with running:
-        found = search(bench, base.fit, during)
+    while True:
+        with running:
+            searched = search(bench, base.fit, during)
+        if searched is not None:
+            found = searched
+            break
+        # The first effects have shown samples that do not count.
+        with step("refit", "re-fitting the parameters of the model"):
+            base = refit(bench, start)
     # Its own numbers are those that effects have asked for, too.
     base = replace(base, freedoms=[*base.freedoms, *asked_for(start, found.fit.state.added)])
     with step("prove", "validating on held-out data"):

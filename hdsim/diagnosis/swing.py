@@ -1,0 +1,52 @@
+"""A vibration at the beginning of a record that shows once an effect is named.
+
+Behind what is missing it is no larger than what follows (``hdsim.estimate.beginning``), and an effect that is
+found beside it bends the model to it, its damping first of all. So each time that effects were found it is
+asked once more whether a beginning leaves more than all that follows, and again when the model is fitted
+without that. Where most of what was left goes with it, it does not count.
+"""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from hdsim.estimate.beginning import EARLY, hear_beginning
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.refit import together
+
+#: Part of what a model leaves beyond the noise that is most of it.
+MOST = 0.5
+
+
+def hear_swing(bench: Bench, found: Fit) -> bool:
+    """Leave out beginnings of records without which a model leaves less than half of what it did.
+
+    Args:
+        bench: the measured series, weighed; their masks are changed where that is so.
+        found: the model with the effects that were found.
+
+    Returns:
+        Whether something was left out.
+    """
+    kept, begins_s = [(series.train, series.hold) for series in bench.series], dict(bench.begins_s)
+    before = _beyond(bench, found)
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        for _ in range(EARLY):
+            if not hear_beginning(bench, found.predictions):
+                break
+            found = together(bench, found, rough=True)
+        if _beyond(bench, found) < (1.0 - MOST) * before:
+            return True
+    for series, (train, hold) in zip(bench.series, kept, strict=True):
+        series.train, series.hold = train, hold
+    bench.begins_s = begins_s
+    return False
+
+
+def _beyond(bench: Bench, found: Fit) -> float:
+    """Power of what a model leaves beyond the noise."""
+    return bench.power(found.predictions) - sum(bench.noise_powers.values())
