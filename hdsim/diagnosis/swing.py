@@ -34,12 +34,14 @@ def hear_swing(bench: Bench, found: Fit) -> bool:
     """
     kept, begins_s = [(series.train, series.hold) for series in bench.series], dict(bench.begins_s)
     before = _beyond(bench, found)
+    if before <= 0.0:
+        return False
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         for _ in range(EARLY):
             if not hear_beginning(bench, found.predictions):
                 break
             found = together(bench, found, rough=True)
-        if _beyond(bench, found) < (1.0 - MOST) * before:
+        if bench.begins_s != begins_s and _beyond(bench, found) < (1.0 - MOST) * before:
             return True
     for series, (train, hold) in zip(bench.series, kept, strict=True):
         series.train, series.hold = train, hold

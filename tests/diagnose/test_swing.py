@@ -82,6 +82,16 @@ def test_a_record_that_begins_at_rest_stays_whole():
         assert np.array_equal(series.hold, hold)
 
 
+def test_a_model_that_leaves_no_more_than_the_noise_does_not_begin_anew():
+    """Nothing was left out, and half of less than nothing is more: it would be asked for ever."""
+    base = Scenario.model_validate(BASE)
+    bench = bench_for([record(AT_REST_S)], [], base, None)
+    found = refit(bench, state_of(base)).fit
+    for series, predicted in zip(bench.series, found.predictions, strict=True):
+        series.measured = predicted.copy()
+    assert not hear_swing(bench, found)
+
+
 @pytest.mark.study
 def test_the_effect_has_its_true_numbers():
     found = diagnose([record(FASTEST_S)], Scenario.model_validate(BASE)).verdict
