@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+from noisy import noisy
 
 import hdsim
-from hdsim.estimate.records import Record
 from hdsim.scenario import Scenario
 
 
@@ -33,7 +32,6 @@ def scenario(mesh: str, seconds: float, effects: str) -> Scenario:
 for mesh in ("rigid", "lumped", "tabulated", "teeth"):
     hdsim.simulate(scenario(mesh, 0.01, "catalogue"))
 drive = scenario("lumped", 3.0, "")
-run, rng = hdsim.simulate(drive), np.random.default_rng(0)
 noise = {"motor_angle": 1e-5, "output_angle": 1e-6, "motor_torque": 1e-3}
-channels = {name: run[name] + size * rng.standard_normal(len(run.time)) for name, size in noise.items()}
-hdsim.fit([Record("swing", run.time, channels)], drive, free=["drive.friction.coulomb_nm"])
+swing = noisy(hdsim.simulate(drive), noise, seed=0, name="swing")
+hdsim.fit([swing], drive, free=["drive.friction.coulomb_nm"])

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 from diagnose_bench import servo_with_arm
+from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis import finer
@@ -17,7 +17,6 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, at_present, fit
 from hdsim.estimate.opening import bench_for
-from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import Added, state_of
 from hdsim.scenario import Scenario
@@ -42,13 +41,9 @@ def with_play(
 ) -> tuple[Bench, Fit, Fit]:
     """A log of a drive, the lumped base re-fitted to it, and that with a plain play and others beside it."""
     run = hdsim.simulate(scenario(mesh, effects))
-    rng = np.random.default_rng(0)
-    # How the load swings in before it is driven, nobody could know from the log.
-    rows = run.time >= 2.0
-    time = run.time[rows] - 2.0
-    channels = {c: run[c][rows] + size * rng.standard_normal(len(time)) for c, size in NOISE.items()}
     base = scenario(LUMPED, {})
-    bench = bench_for([Record("r", time, channels)], [], base, None)
+    # How the load swings in before it is driven, nobody could know from the log.
+    bench = bench_for([noisy(run, NOISE, seed=0, begins_s=2.0)], [], base, None)
     found = refit(bench, state_of(base)).fit
     plain = next(f for f in catalogue()[PLAY].fittings if f.play and f.label == label)
     added, *_ = starts(PLAY, plain, (), bench.ranges(found.state))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnose_bench import servo_with_arm
+from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis import candidate_fits
@@ -19,7 +20,6 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, added_spreads
 from hdsim.estimate.opening import bench_for
-from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import Added, state_of
 from hdsim.estimate.write import fitted_numbers
@@ -35,10 +35,8 @@ def scenario(effects: dict[str, Any]) -> Scenario:
 
 def opened(slip_nm: float, scale: float) -> tuple[Bench, Fit]:
     run = hdsim.simulate(scenario({MAXWELL: {"slip_torque_nm": slip_nm, "slip_twist_scale": scale}}))
-    rng = np.random.default_rng(0)
-    channels = {c: run[c] + size * rng.standard_normal(len(run.time)) for c, size in NOISE.items()}
     base = scenario({})
-    bench = bench_for([Record("r", run.time, channels)], [], base, None)
+    bench = bench_for([noisy(run, NOISE, seed=0)], [], base, None)
     return bench, refit(bench, state_of(base)).fit
 
 

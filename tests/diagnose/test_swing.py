@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis.starts import starts
@@ -45,10 +46,7 @@ ERROR = {"components": [{"order": 2, "amplitude_arcmin": 0.6, "phase_deg": 30.0}
 
 def record(begins_s: float) -> Record:
     run = hdsim.simulate(Scenario.model_validate(BASE | {"effects": {NAME: ERROR}}))
-    rng = np.random.default_rng(3)
-    rows = run.time >= begins_s
-    channels = {c: run[c][rows] + size * rng.standard_normal(rows.sum()) for c, size in NOISE.items()}
-    return Record("run", run.time[rows] - begins_s, channels)
+    return noisy(run, NOISE, seed=3, begins_s=begins_s)
 
 
 def with_the_error(begins_s: float) -> tuple[Bench, Fit]:

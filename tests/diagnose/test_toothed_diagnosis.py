@@ -2,12 +2,11 @@
 
 import time
 
-import numpy as np
 import pytest
+from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis.workflow import diagnose
-from hdsim.estimate.records import Record
 from hdsim.scenario import Scenario
 
 NOISE = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3}
@@ -30,9 +29,7 @@ def drive(mesh, **effects):
 
 
 def seen(plant):
-    run, rng = hdsim.simulate(plant), np.random.default_rng(0)
-    channels = {c: run[c] + size * rng.standard_normal(len(run.time)) for c, size in NOISE.items()}
-    return Record("swing", run.time, channels)
+    return noisy(hdsim.simulate(plant), NOISE, seed=0, name="swing")
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from noisy import noisy
 
 import hdsim
 from hdsim.estimate.beginning import EARLY, STRETCHES, beginnings, hear_beginning
@@ -34,13 +35,7 @@ SCENARIO = Scenario.model_validate({
 def measured(begins_s: float) -> Record:
     """The scenario's run from a time on."""
     run = hdsim.simulate(SCENARIO)
-    rng = np.random.default_rng(1)
-    rows = run.time >= begins_s
-    return Record(
-        "run",
-        run.time[rows] - begins_s,
-        {c: run[c][rows] + size * rng.standard_normal(rows.sum()) for c, size in NOISE.items()},
-    )
+    return noisy(run, NOISE, seed=1, begins_s=begins_s)
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from noisy import noisy
 from test_beginning import SCENARIO as SWINGING
 from test_beginning import measured as swinging
 
@@ -28,12 +29,7 @@ LOCKED = {
 def twisted(seed: int) -> Record:
     """A drive whose motor is locked."""
     run = hdsim.simulate(Scenario.model_validate(LOCKED))
-    rng = np.random.default_rng(seed)
-    return Record(
-        f"draw {seed}",
-        run.time,
-        {c: run[c] + size * rng.standard_normal(len(run.time)) for c, size in NOISE.items()},
-    )
+    return noisy(run, NOISE, seed=seed, name=f"draw {seed}")
 
 
 @pytest.mark.parametrize("turned_rad", [0.0, 2e-4, -1.5e-4])

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from noisy import noisy
 from scipy.interpolate import PPoly
 
 import hdsim
 from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.opening import bench_for
-from hdsim.estimate.records import Record
 from hdsim.estimate.spline import drawn_anew, spline_through
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
@@ -36,10 +36,7 @@ SCENARIO = Scenario.model_validate({
 
 def opened():
     run = hdsim.simulate(SCENARIO)
-    rng = np.random.default_rng(4)
-    rows = run.time >= 2.0
-    channels = {c: run[c][rows] + size * rng.standard_normal(rows.sum()) for c, size in NOISE.items()}
-    return bench_for([Record("run", run.time[rows] - 2.0, channels)], [], SCENARIO, None)
+    return bench_for([noisy(run, NOISE, seed=4, begins_s=2.0)], [], SCENARIO, None)
 
 
 def output_of(bench):
