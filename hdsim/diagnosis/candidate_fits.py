@@ -211,7 +211,7 @@ def full_fits(bench: Bench, base: Fit, found: Fit) -> list[Fit]:
 
     Short of the noise it may have stopped because its sensitivities no longer held: they are made anew.
     """
-    if bench.power(found.predictions) > REACHED * sum(bench.noise_powers.values()):
+    if bench.power(found.predictions) > REACHED * bench.noise_power:
         found = sharpened(bench, found)
     theta = {free.name: float(t) for free, t in zip(found.frees, found.theta, strict=True)}
     state = replace(base.state, added=found.state.added)

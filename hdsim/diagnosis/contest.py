@@ -87,7 +87,7 @@ def contest(
             keep(one.name, rough_fits(bench, base, here, each.added, columns, bench.sample_power(rest)))
     if not best:
         return []
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     least = min(loss for loss, _ in best.values())
     given = given_point(bench, base) if least > REACHED * noise else None
     if given is not None:
@@ -133,7 +133,7 @@ def _after_the_best(
     loss, leader = best[name]
     if loss > FAR_LEFT_IN * min(least for least, _ in best.values()):
         return  # what is missing is none of them
-    enough = (1.0 + LAGS) * max(loss, sum(bench.noise_powers.values()))
+    enough = (1.0 + LAGS) * max(loss, bench.noise_power)
     rivals = [one for one in series if best.get(one.name, (math.inf, None))[0] > enough]
     if not rivals:
         return

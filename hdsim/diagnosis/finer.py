@@ -46,7 +46,7 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
         current: the model.
         tell: told what is being done.
     """
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     *others, plain = current.state.added
     begins = list(_begins(bench, current, plain))
     if bench.power(current.predictions) <= REACHED * noise or not begins:
@@ -92,12 +92,10 @@ def each_refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], ob
 def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
     """An effect in the others of its finer formulas, as large as it is: their further terms at none.
 
-    Of one that is finer already those that need less, with its shapes.
+    Shapes that it has already begin where they are.
     """
     finer: tuple[Fitting, ...] = catalogue()[plain.effect].finer
-    is_finer = any(fitting.label == plain.fitting.label for fitting in finer)
-    paths = (shape.path for shape in plain.fitting.shapes)
-    own = dict(zip(paths, plain.shapes, strict=True)) if is_finer else {}
+    own = dict(zip((shape.path for shape in plain.fitting.shapes), plain.shapes, strict=True))
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
             continue
@@ -108,14 +106,13 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
             for term, part in one.fitting.parts(()):
                 coefficients += [term.read(plain.settings())] * (part.stop - part.start)
             shapes = (own.get(x.path, start) for x, start in zip(fitting.shapes, one.shapes, strict=True))
-            if not is_finer or one.freedom < plain.freedom:
-                yield replace(one, coefficients=tuple(coefficients), shapes=tuple(shapes))
+            yield replace(one, coefficients=tuple(coefficients), shapes=tuple(shapes))
 
 
 def _with_fewer(bench: Bench, found: Fit) -> list[Fit]:
     """Fits of formulas with fewer numbers from where that with more is: they may not have come as far."""
     *others, finer = found.state.added
-    begins = list(_begins(bench, found, finer))
+    begins = [one for one in _begins(bench, found, finer) if one.freedom < finer.freedom]
     ends = _at_their_ends(bench, [(found, [*others, one]) for one in _nearest(bench, found, begins)])
     return [end for end in ends if not end.state.added[-1].at_limit]
 

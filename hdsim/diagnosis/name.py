@@ -149,7 +149,7 @@ def name_effect(
     explained = float((before - losses).sum())
     group = {}
     on_screen = {one.name: one for one in shortlist}
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     whole = float(before.sum()) - noise
     for other, rival, rest in results[1:]:
         if rival.state.added[-1].at_limit and not found.state.added[-1].at_limit:

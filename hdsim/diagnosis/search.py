@@ -87,7 +87,7 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         late = with_delays(bench, found.fit, rough=True)
         if late is None:
             return _settled(bench, base, found, during)
-        noise = sum(bench.noise_powers.values())
+        noise = bench.noise_power
         left, now = (bench.power(each.predictions) - noise for each in (found.fit, late))
         lines = lines_shown(bench, found.fit, late)
         found.fit = late

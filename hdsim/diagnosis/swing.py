@@ -51,4 +51,4 @@ def hear_swing(bench: Bench, found: Fit) -> bool:
 
 def _beyond(bench: Bench, found: Fit) -> float:
     """Power of what a model leaves beyond the noise."""
-    return bench.power(found.predictions) - sum(bench.noise_powers.values())
+    return bench.power(found.predictions) - bench.noise_power

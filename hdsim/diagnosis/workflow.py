@@ -176,14 +176,10 @@ def _diagnosed(
         running.enter_context(step(name, text))
         return tell
 
-    while True:
-        with running:
-            searched = search(bench, base.fit, during)
-        if searched is not None:
-            found = searched
-            break
-        # The first effects have shown samples that do not count.
-        with step("refit", "re-fitting the parameters of the model"):
+    with running:
+        while (found := search(bench, base.fit, during)) is None:
+            # The first effects have shown samples that do not count.
+            during("refit", "re-fitting the parameters of the model")
             base = refit(bench, start)
     # Its own numbers are those that effects have asked for, too.
     base = replace(base, freedoms=[*base.freedoms, *asked_for(start, found.fit.state.added)])

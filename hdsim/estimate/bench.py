@@ -104,6 +104,11 @@ class Bench:
         return found
 
     @property
+    def noise_power(self) -> float:
+        """The same of all channels together."""
+        return sum(self.noise_powers.values())
+
+    @property
     def turns(self) -> float:
         """Longest travel of the wave generator in a training record, turns."""
         return max(float(np.ptp(p.motor_angle)) for p in self.predictors[: self.training]) / (2 * np.pi)

@@ -108,7 +108,7 @@ def nothing_but_flanks(bench: Bench, power: float, project: Callable[[Array], Ar
 
     Where it lies is not asked: what a wider gap leaves is no curve over one coordinate.
     """
-    return only_flanks(bench, power - sum(bench.noise_powers.values()), project)
+    return only_flanks(bench, power - bench.noise_power, project)
 
 
 def of_other_flanks(

@@ -150,16 +150,16 @@ def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
         heard: whether samples no longer count that leave more than the others with the delays.
     """
     late = with_delays(bench, found)
-    if late is None or bench.power(found.predictions) <= sum(bench.noise_powers.values()):
+    if late is None or bench.power(found.predictions) <= bench.noise_power:
         return found
     if heard(late):
         found = settled(bench, together(bench, found, rough=True))
         _widened(bench, found)
         reweigh(bench, found)
-        if bench.power(found.predictions) <= REACHED * sum(bench.noise_powers.values()):
+        if bench.power(found.predictions) <= REACHED * bench.noise_power:
             return found
         late = with_delays(bench, found) or found
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     if bench.power(late.predictions) - noise >= ALL * (bench.power(found.predictions) - noise):
         return found
     reweigh(bench, late)
@@ -193,7 +193,7 @@ def _with_those_left(bench: Bench, found: Fit) -> Fit:
     nothing can be told; once all numbers have moved together it is gone, and the data tell them.
     """
     left = [free for free in found.undetermined if not free.reading]
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     before = bench.power(found.predictions)
     if not left or before <= REACHED * noise:
         return found
@@ -250,7 +250,7 @@ def together(bench: Bench, found: Fit, state: State | None = None, *, rough: boo
     # A number that a missing effect has driven to nearly nothing leaves no slope to come back by.
     far = {f.name: f.none for f in frees if not f.step and abs(f.none) > FAR * f.prior}
     whole = fit(bench, state or found.state, frees, after=readings, rough=True)
-    if far and bench.power(whole.predictions) > REACHED * sum(bench.noise_powers.values()):
+    if far and bench.power(whole.predictions) > REACHED * bench.noise_power:
         other = fit(bench, state or found.state, frees, theta=far, after=readings, rough=True)
         whole = min(whole, other, key=lambda each: unlikelihood(bench, each, whole))
     if rough:
