@@ -55,7 +55,7 @@ def with_play(
 
 
 def beyond(bench: Bench, found: Fit) -> float:
-    return bench.power(found.predictions) / sum(bench.noise_powers.values()) - 1.0
+    return bench.power(found.predictions) / bench.noise_power - 1.0
 
 
 @pytest.mark.slow

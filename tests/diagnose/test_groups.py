@@ -42,7 +42,7 @@ def test_another_name_explains_at_least_half_of_what_the_best_does(monkeypatch, 
     bench = SimpleNamespace(
         coarse=contextlib.nullcontext,
         block_powers=lambda predictions: predictions,
-        noise_powers={"motor_torque": 10.0},
+        noise_power=10.0,
     )
     base = SimpleNamespace(predictions=BEFORE, frees=[], theta=[])
     screening = SimpleNamespace(ranked=[best, other], chance=0.005)

@@ -79,7 +79,7 @@ def test_a_fit_that_begins_at_the_next_minimum_ends_at_the_true_slip_torque(
     assert numbers["slip_torque_nm"].value == pytest.approx(slip_nm, rel=0.15)
     assert numbers["slip_twist_scale"].value == pytest.approx(scale, rel=0.2)
     # A hundredth of the power is a tenth of the root mean square.
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     assert bench.power(whole.predictions) - noise < 0.01 * (bench.power(base.predictions) - noise)
 
 

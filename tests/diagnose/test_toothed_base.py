@@ -158,7 +158,7 @@ def test_a_tooth_is_found_in_a_drive_whose_arc_of_teeth_is_another() -> None:
     )
     arc = found.state.drive.mesh.engagement
     assert arc.share == pytest.approx(NARROWER["share"], rel=0.03)
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     assert bench.power(found.predictions) < 1.5 * noise, (
         "with the model's arc twice the noise or more is left"
     )

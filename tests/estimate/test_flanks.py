@@ -117,7 +117,7 @@ def test_a_drive_with_its_own_flanks_differs_by_what_other_flanks_do() -> None:
     other = np.random.default_rng(1).standard_normal((len(largest), 2))
     assert of_other_flanks(bench, as_it_is, [other]) < 0.1 * most, "such a trace takes little of theirs"
     assert of_other_flanks(bench, as_it_is, [other, largest[:, None]]) == pytest.approx(most)
-    noise = sum(bench.noise_powers.values())
+    noise = bench.noise_power
     assert nothing_but_flanks(bench, noise + 0.9 * most, as_it_is)
     assert not nothing_but_flanks(bench, noise + 1.1 * most, as_it_is)
 
