@@ -3,10 +3,11 @@
     python benchmarks/ensemble.py [RUNS]
 
 An ensemble of RUNS (64) short runs that differ in a number, ``hdsim.simulate_all``, against single runs
-(``Run.record``), in one thread and in two, and against a pool of one process that makes ``Run.record``; the
-same runs' compiled integration alone in one thread and in two: what the machine lets two threads gain; ten
-sensitivities of ``scenarios/seed_move.yaml`` against the run alone; one run with each mesh. Wall seconds, the
-processor's for what runs alone; medians of the rounds.
+(``Run.record``), in one thread and in two, and against a pool of one process that makes ``Run.record``, for
+runs of several lengths: the shorter, the more of a run is not its integration. The compiled integration of
+the longest alone in one thread and in two: what the machine lets two threads gain; ten sensitivities of
+``scenarios/seed_move.yaml`` against the run alone; one run with each mesh. Wall seconds, the processor's for
+what runs alone; medians of the rounds.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ from hdsim.simulation.setup import build_run
 SCENARIO = Path(__file__).parents[1] / "scenarios" / "seed_move.yaml"
 CHANNELS = ("motor_angle", "output_angle")
 ROUNDS = 5
+#: Lengths of short runs, s of the drive's time.
+LENGTHS_S = (0.1, 0.3, 0.6, 1.2)
 PARAMETERS = (
     "drive.torsion.stiffness_k1_nm_per_rad",
     "drive.torsion.damping_nm_s_per_rad",
@@ -46,13 +49,13 @@ PARAMETERS = (
 )
 
 
-def scenario_of(mesh: str, inertia_kg_m2: float = 0.5) -> Scenario:
-    """The move with a mesh and a load."""
+def scenario_of(mesh: str, inertia_kg_m2: float = 0.5, duration_s: float = LENGTHS_S[-1]) -> Scenario:
+    """The move's beginning with a mesh and a load."""
     data = hdsim.load_scenario(SCENARIO).model_dump(mode="json")
     if mesh != "teeth":
         data["drive"]["mesh"] = {"model": mesh}
     data["load"]["inertia_kg_m2"] = inertia_kg_m2
-    data["run"]["teeth_rate_hz"] = 0.0
+    data["run"] |= {"teeth_rate_hz": 0.0, "duration_s": duration_s}
     return Scenario.model_validate(data)
 
 
@@ -87,9 +90,9 @@ def ratio(over: list[float], under: list[float]) -> float:
     return statistics.median(a / b for a, b in zip(over, under, strict=True))
 
 
-def ensembles(runs: int) -> None:
+def ensembles(runs: int, duration_s: float) -> None:
     """Print the ratios of an ensemble."""
-    scenarios = [scenario_of("lumped", 0.5 * (1.0 + 0.01 * k)) for k in range(runs)]
+    scenarios = [scenario_of("lumped", 0.5 * (1.0 + 0.01 * k), duration_s) for k in range(runs)]
     plain = [one.model_dump(mode="json") for one in scenarios]
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         found = in_turns(
@@ -102,7 +105,8 @@ def ensembles(runs: int) -> None:
         )
     each = {name: 1e3 * statistics.median(spent) / runs for name, spent in found.items()}
     print(
-        f"ensemble of {runs}: {each['one']:.1f} ms a run in one thread, single runs {each['single']:.1f} ms"
+        f"ensemble of {runs} of {duration_s:g} s: {each['one']:.1f} ms a run in one thread, single runs "
+        f"{each['single']:.1f} ms"
     )
     print(f"  single runs / ensemble in one thread   {ratio(found['single'], found['one']):.2f}")
     print(f"  pool of one process / one thread       {ratio(found['pool'], found['one']):.2f} (wanted: 1.5)")
@@ -133,7 +137,8 @@ def machine(runs: int) -> None:
 
 def main(runs: int) -> None:
     """Measure and print."""
-    ensembles(runs)
+    for duration_s in LENGTHS_S:
+        ensembles(runs, duration_s)
     machine(runs)
     alone: dict[str, list[float]] = {}
     for mesh in ("lumped", "teeth"):
