@@ -70,6 +70,27 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
     return current
 
 
+def base_alone(bench: Bench, base: Fit, current: Fit) -> Fit | None:
+    """The base's own numbers where they explain what the only name was given for; None where they don't.
+
+    A re-fit may end at another minimum than the nearest to the truth. A fit beside an effect comes out of it,
+    and the effect is given for what the numbers have done since.
+
+    Args:
+        bench: the measured series.
+        base: the re-fitted model.
+        current: the model with the one name, settled.
+    """
+    gained = bench.power(base.predictions) - bench.power(current.predictions)
+    if gained <= EXCESS * bench.noise_power:
+        return None
+    rest = without(bench, current, 0)
+    if rest is None:
+        return None
+    lost = bench.power(rest.predictions) - bench.power(current.predictions)
+    return together(bench, rest) if lost < NEEDLESS * gained else None
+
+
 def _least_needed(bench: Bench, current: Fit, named: Sequence[Named], others: list[Fit | None]) -> int:
     """Which name is needed least, or one that is needless.
 

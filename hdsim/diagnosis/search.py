@@ -21,7 +21,8 @@ from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, Named, name_effect
-from hdsim.diagnosis.revise import revised
+from hdsim.diagnosis.rest import hear_rest
+from hdsim.diagnosis.revise import base_alone, revised
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.swing import hear_swing
 from hdsim.diagnosis.traces import Screening, ranked_anew, screen
@@ -55,12 +56,16 @@ class Stage:
 
 @dataclass
 class Search:
-    """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit."""
+    """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit.
+
+    ``better`` is the base without effects where its own numbers explain what the only one was given for.
+    """
 
     fit: Fit
     left: Residual
     stages: list[Stage] = field(default_factory=list)
     named: list[Named] = field(default_factory=list)
+    better: Fit | None = None
 
 
 def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Search | None:
@@ -72,12 +77,12 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
         during: told the step that begins and what it does; returns who is told the details.
 
     Returns:
-        None where a vibration at the beginning of a record was behind the first effects: it does not count
-            any more, and all begins anew.
+        None where a vibration at the beginning of a record, or a shaft that sticks, was behind the first
+            effects: it does not count any more, and all begins anew.
     """
     found = Search(base, left_of(bench, base))
     while True:
-        if found.named and hear_swing(bench, found.fit):
+        if found.named and (hear_swing(bench, found.fit) or hear_rest(bench, found.fit)):
             return None
         following = _next(bench, base, found, during)
         if following is not None:
@@ -117,6 +122,9 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
             asked = again(bench, base, found.fit, found.named, tell, before=before, every=True)
             found.fit = together(bench, asked)
             found.fit = revised(bench, found.fit, found.named, tell)
+        if len(found.named) == 1:
+            tell(f"without {found.named[0].name}")
+            found.better = base_alone(bench, base, found.fit)
         for one in found.named:
             if one.name in one.alike:
                 one.group = dict.fromkeys(sorted(one.alike - {one.name}), 1.0) | one.group

@@ -177,10 +177,15 @@ def _diagnosed(
         return tell
 
     with running:
-        while (found := search(bench, base.fit, during)) is None:
-            # The first effects have shown samples that do not count.
+        while (found := search(bench, base.fit, during)) is None or found.better is not None:
             during("refit", "re-fitting the parameters of the model")
-            base = refit(bench, start)
+            if found is None:
+                # The first effects have shown samples that do not count.
+                base = refit(bench, start)
+            elif found.better is not None:
+                # The effect has only shown the base's own numbers a better minimum.
+                own = base_intervals(found.better, base.freedoms)
+                base = replace(base, fit=found.better, intervals=own)
     # Its own numbers are those that effects have asked for, too.
     base = replace(base, freedoms=[*base.freedoms, *asked_for(start, found.fit.state.added)])
     with step("prove", "validating on held-out data"):

@@ -133,7 +133,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
 
     def heard(late: Fit) -> bool:
         """Whether fewer samples count now: what a delay leaves hides what a rest or a beginning does."""
-        rested = hear_standstill(bench, state, before, late, lambda: late, partial(_at_its_end, bench))
+        rested = hear_standstill(bench, state, before, late, lambda: late, partial(at_its_end, bench))
         return hear_beginning(bench, rested.predictions) or rested is not late
 
     found = _delayed(bench, found, heard)
@@ -177,7 +177,7 @@ def _roughly(bench: Bench, state: State, freedoms: Sequence[Free]) -> tuple[list
     return before, found
 
 
-def _at_its_end(bench: Bench, found: Fit) -> Fit:
+def at_its_end(bench: Bench, found: Fit) -> Fit:
     """A fit carried on under weights that follow what it leaves, until they stay."""
     for _ in range(WEIGHINGS):
         found = together(bench, found, rough=True)

@@ -68,8 +68,7 @@ def hear_standstill(
     Returns:
         The fit under the sign that was taken.
     """
-    friction = given.drive.friction
-    if not friction.sticks or max(friction.coulomb_nm, friction.load_coefficient) == 0.0:
+    if not given.drive.friction.sticks or not has_a_sign(given):
         return found
     signs = [predictor.smoothing for predictor in bench.predictors]
     sharp = [resolution(predictor.speed_noise) for predictor in bench.predictors]
@@ -84,12 +83,7 @@ def hear_standstill(
     def end_of(fit: Fit) -> Fit:
         return fit if carried_on is None else carried_on(fit)
 
-    turning = [
-        ~at_rest(bench.predictors[s.record])
-        if s.channel == "motor_torque"
-        else np.ones(len(s.train), dtype=bool)
-        for s in bench.series
-    ]
+    turning = _turning(bench)
     with contextlib.suppress(PredictionError):
         # A first look needs no reason; what is asked of the found fit costs no prediction.
         asked = carried_on is None or _held(bench, found.predictions, turning)
@@ -98,10 +92,7 @@ def hear_standstill(
             asked = _matters(bench, before, bench.predict(given), turning)
             take(signs)
         if asked:
-            for series, rows in zip(bench.series, turning, strict=True):
-                # Of a record that hardly turns, what it has is better than nothing.
-                if ((series.train | series.hold) & rows).sum() >= FEWEST_SAMPLES:
-                    series.train, series.hold = series.train & rows, series.hold & rows
+            _leave_out(bench, turning)
             # Both are carried on with the same samples.
             smooth = end_of(found)
             take(sharp)
@@ -112,6 +103,51 @@ def hear_standstill(
     for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
         series.train, series.hold, series.sigma = train, hold, sigma
     return found
+
+
+def has_a_sign(state: State) -> bool:
+    """Whether a drive's own friction jumps where its motor turns round."""
+    return bool(max(state.drive.friction.coulomb_nm, state.drive.friction.load_coefficient) > 0.0)
+
+
+def leave_out_rest(bench: Bench, found: Fit) -> bool:
+    """Leave out the motor's torque at rest where a base without friction misses it more than while it turns.
+
+    There is no sign to be taken sharper (``hear_standstill``), and friction that is named as an effect would
+    be asked for what no function of the motion is. Rest is what its formula takes for that, whose sign is
+    smoothed over ``RESOLVED_RAD_PER_S``.
+
+    Args:
+        bench: the measured series, weighed; masks are changed.
+        found: the model with the effects that were found.
+
+    Returns:
+        Whether something was left out.
+    """
+    turning = _turning(bench, RESOLVED_RAD_PER_S)
+    return _held(bench, found.predictions, turning) and _leave_out(bench, turning)
+
+
+def _turning(bench: Bench, least: float = 0.0) -> list[Mask]:
+    """Samples of each series that a shaft at rest has no part in, shape (n,) each; ``least`` as there."""
+    return [
+        ~at_rest(bench.predictors[s.record], least)
+        if s.channel == "motor_torque"
+        else np.ones(len(s.train), dtype=bool)
+        for s in bench.series
+    ]
+
+
+def _leave_out(bench: Bench, turning: Sequence[Mask]) -> bool:
+    """Only samples while the shaft turns count; whether that leaves out any."""
+    changed = False
+    for series, rows in zip(bench.series, turning, strict=True):
+        counted = series.train | series.hold
+        # Of a record that hardly turns, what it has is better than nothing.
+        if (counted & rows).sum() >= FEWEST_SAMPLES:
+            changed = changed or bool((counted & ~rows).any())
+            series.train, series.hold = series.train & rows, series.hold & rows
+    return changed
 
 
 def _matters(bench: Bench, before: Sequence[Array], now: Sequence[Array], turning: Sequence[Mask]) -> bool:
@@ -154,7 +190,7 @@ def _held(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> boo
         independent = rest.sum() / correlation(left[rest], series.block[rest])
         if more > 1.0:
             better += 0.5 * independent * (more - 1.0 - math.log(more))
-    return better > CLEARLY
+    return bool(better > CLEARLY)
 
 
 def resolution(noise: float) -> float:
@@ -168,10 +204,15 @@ def resolution(noise: float) -> float:
     return float(np.clip(SMOOTHED * noise, STICKS_RAD_PER_S, RESOLVED_RAD_PER_S))
 
 
-def at_rest(predictor: Predictor) -> Mask:
-    """Samples of a record at which its motor may rest or reverse, and those next to them, shape (n,)."""
+def at_rest(predictor: Predictor, least: float = 0.0) -> Mask:
+    """Samples of a record at which its motor may rest or reverse, and those next to them, shape (n,).
+
+    Args:
+        predictor: of the record.
+        least: smoothing speed of a sign that is no sharper, however well the speed is known, rad/s.
+    """
     speed = predictor.motor_velocity
-    smoothing = resolution(predictor.speed_noise)
+    smoothing = max(resolution(predictor.speed_noise), least)
     return standing(speed, smoothing, predictor.motor_angle, SEEN * predictor.angle_noise)
 
 

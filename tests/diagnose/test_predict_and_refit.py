@@ -13,7 +13,7 @@ from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import robust_covariance
 from hdsim.estimate.fit import base_intervals, fit
-from hdsim.estimate.numbers import Free, base_freedoms
+from hdsim.estimate.numbers import Free, Interval, base_freedoms
 from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, tie, together, with_delays
@@ -134,6 +134,15 @@ def test_a_torque_that_is_stamped_late_or_early_does_not_bend_the_friction(tmp_p
     assert [(p.channel, p.kind, "early" in p.message) for p in told] == (
         [("motor_torque", "clock", late < 0)] if late else []
     )
+
+
+def test_a_delay_that_the_data_do_not_bound_is_not_told(tmp_path):
+    bench = Bench(predictors([rigid_record(8.0, noise=5e-4)], -100.0))
+    late, nan = {"delay_of": "motor_torque"}, math.nan
+    bounded = Interval("motor_torque_delay_s", 0.05, 0.0, 0.04, 0.06, "s", True, [], **late)
+    unbounded = Interval("motor_torque_delay_s", 0.05, 0.0, nan, nan, "s", False, [], **late)
+    assert [p.kind for p in delays(bench, [bounded])] == ["clock"]
+    assert not delays(bench, [unbounded])
 
 
 def test_a_prior_stays_where_the_model_was_given():

@@ -6,10 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
+from moves import MOVES
+from noisy import noisy
 
-from hdsim.diagnosis.revise import NEEDLESS, _least_needed, needed, revised, stand_ins
+import hdsim
+from hdsim.diagnosis.revise import NEEDLESS, _least_needed, base_alone, needed, revised, stand_ins
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.refit import together
+from hdsim.scenario import Scenario
 
 
 def hidden(angle, velocity):
@@ -136,3 +140,34 @@ def test_models_without_a_name_are_carried_on_until_one_is_needless(
     named = [SimpleNamespace(needed=part) for part in rough]
     assert _least_needed(None, None, named, [0, 1, 2]) == least
     assert gone_on == settled
+
+
+@pytest.mark.parametrize(
+    ("named", "alone", "better"),
+    [
+        (200.0, 210.0, True),  # the base's numbers do all that the name was given for
+        (200.0, 900.0, False),  # most of it goes with the name
+        (995.0, 996.0, False),  # the name was given for next to nothing
+    ],
+)
+def test_a_name_is_none_where_the_base_explains_as_much_from_there(monkeypatch, named, alone, better):
+    fits = {power: SimpleNamespace(predictions=power) for power in (1000.0, named, alone)}
+    bench = SimpleNamespace(power=float, noise_power=150.0)
+    monkeypatch.setattr("hdsim.diagnosis.revise.without", lambda *_: fits[alone])
+    monkeypatch.setattr("hdsim.diagnosis.revise.together", lambda _, found: found)
+    assert base_alone(bench, fits[1000.0], fits[named]) is (fits[alone] if better else None)
+
+
+@pytest.mark.study
+def test_half_a_stiffness_is_no_friction():
+    """The re-fit ends at another minimum, out of which it comes beside whatever is named."""
+    load = MOVES["load"] | {"gravity": {"mass_kg": 5.0, "centre_of_mass_m": 0.3}}
+    true = Scenario.model_validate(MOVES | {"load": load, "run": MOVES["run"] | {"duration_s": 8.0}})
+    halves = {"stiffness_k1_nm_per_rad": 8000.0, "stiffness_k2_nm_per_rad": 12500.0}
+    base = true.with_({f"drive.torsion.{name}": value for name, value in halves.items()})
+    noise = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
+    verdict = diagnose([noisy(hdsim.simulate(true), noise, seed=1)], base).verdict
+    assert verdict.verdict == "parameter"
+    assert verdict.moved == ["drive.torsion.stiffness_k1_nm_per_rad"]
+    assert verdict.parameters[verdict.moved[0]].value == pytest.approx(16000.0, rel=0.01)
+    assert verdict.gap["output_angle"].after < 1.1 * verdict.gap["output_angle"].noise

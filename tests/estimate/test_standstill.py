@@ -6,13 +6,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from moves import MOVES
+from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit
-from hdsim.estimate.standstill import hear_standstill, resolution, standing
+from hdsim.estimate.standstill import hear_standstill, leave_out_rest, resolution, standing
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 
@@ -190,6 +192,54 @@ def test_of_a_long_rest_no_sample_counts_as_turning():
     found = standing(speed, smoothing, angle, 2e-4)
     assert found[:3000].all()
     assert not found[3300:].any()
+
+
+def without_friction(moves):
+    none = {"coulomb_nm": 0.0, "viscous_nm_s_per_rad": 0.0, "load_coefficient": 0.0}
+    return Scenario.model_validate(moves | {"drive": moves["drive"] | {"friction": none}})
+
+
+@pytest.mark.slow
+def test_a_base_without_friction_is_not_asked_for_what_holds_a_shaft_at_rest():
+    run = hdsim.simulate(Scenario.model_validate(MOVES))
+    noise = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
+    verdict = diagnose([noisy(run, noise, seed=1)], without_friction(MOVES)).verdict
+    assert [one.name for one in verdict.effects] == ["input_coulomb_viscous"]
+    gap = verdict.gap["motor_torque"]
+    assert gap.after < 1.2 * gap.noise < 0.1 * gap.before
+    true = Scenario.model_validate(MOVES).drive.friction
+    viscous = verdict.effects[0].parameters["viscous_nm_s_per_rad"]
+    assert viscous.interval[0] < true.viscous_nm_s_per_rad < viscous.interval[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("held_nm", [0.03, 0.0])
+def test_rests_are_left_out_where_more_is_missed_there(held_nm):
+    run = hdsim.simulate(Scenario.model_validate(MOVES))
+    record = noisy(run, {"motor_angle": 3e-5, "motor_torque": 3e-3}, seed=1)
+    bench = bench_for([record], [], without_friction(MOVES))
+    (series,) = bench.series
+    counted = series.train | series.hold
+    noise = 3e-3 * np.random.default_rng(4).standard_normal(len(record.time))
+    rest = np.abs(bench.predictors[0].motor_velocity) < 0.3
+    held = held_nm * rest * np.where(record.time % 1.0 < 0.5, 1.0, -1.0)
+    found = SimpleNamespace(predictions=[series.measured - noise - held])
+    assert leave_out_rest(bench, found) == (held_nm > 0)
+    now = series.train | series.hold
+    assert not now[rest].any() if held_nm else np.array_equal(now, counted)
+    assert not leave_out_rest(bench, found)  # nor again: it would begin anew for ever
+
+
+@pytest.mark.study
+def test_beside_an_effect_what_holds_a_shaft_is_no_friction_that_remembers():
+    """Behind the kinematic error nothing more is missed at rest; LuGre friction would be the next name."""
+    error = {"components": [{"order": 2, "amplitude_arcmin": 0.6, "phase_deg": 30.0}]}
+    moves = MOVES | {"run": MOVES["run"] | {"duration_s": 8.0}}
+    run = hdsim.simulate(Scenario.model_validate(moves | {"effects": {"kinematic_error": error}}))
+    noise = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
+    verdict = diagnose([noisy(run, noise, seed=1)], Scenario.model_validate(moves)).verdict
+    assert [one.name for one in verdict.effects] == ["kinematic_error"]
+    assert verdict.gap["motor_torque"].after < 1.2 * verdict.gap["motor_torque"].noise
 
 
 TWISTED = {
