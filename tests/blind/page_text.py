@@ -71,17 +71,18 @@ does not reach its strength at the largest size below is drawn again too, with g
 to {LEAST_NOISE:g} times the usual noise), and in the end the nearest is taken: strengths in the tables are
 those that were reached.
 
-`--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on the
-page of this version none is left out. Of its test cases (seed 19, from number 12 on, of `real` from 36 on;
-`teeth`: seed 17) none had been looked into when they were run: in the order of their numbers, as many as time
-allowed; of `numpy` and `mujoco` from 96 on those first that hide nothing, for the false alarms, and of
-`toothed` from 96 on and `numpy` from 201 on those alone. Of this version are those of `mujoco` from 191 on and
-of `numpy` from 191 to 200, but for the ones in which no effect is hidden. The others from 70 on, of `real` from 126 on, are
-of the version before three steps that follow once an effect is identified: a vibration at the beginning of a
-record and a shaft at rest are left out, and the re-fit's minimum is asked again. Those of `real` from 90 on
-and the others from 57 on are of the one before that, which asked a little more of a second effect; those of `real` had been run once before, with lines in order spectra apart
-from 0.9 of a beat on (34 of 36 were right; the others from 52 to 56 with lines of any distance). Those from
-43, of `real` from 72 on are of one whose groups still held names of effects that had been dropped; the others
+`--most-samples` leaves out, before they are diagnosed, cases whose records hold more samples together; on
+the page of this version none is left out. Of its test cases (seed 19, from number 12 on, of `real` from 36
+on; `teeth`: seed 17) none had been looked into when they were run: in the order of their numbers, as many
+as time allowed; of `numpy` and `mujoco` from 96 on those first that hide nothing, for the false alarms, and
+of `toothed` from 96 on and `numpy` from 201 on those alone. Of this version are those of `mujoco` from 191
+on and of `numpy` from 191 to 200, but for the ones in which no effect is hidden. The others from 70 on, of
+`real` from 126 on, are of the version before three steps that follow once an effect is identified: a
+vibration at the beginning of a record and a shaft at rest are left out, and the re-fit's minimum is asked
+again. Those of `real` from 90 on and the others from 57 on are of the one before that, which asked a little
+more of a second effect; those of `real` had been run once before, with lines in order spectra apart from
+0.9 of a beat on (34 of 36 were right; the others from 52 to 56 with lines of any distance). Those from 43,
+of `real` from 72 on are of one whose groups still held names of effects that had been dropped; the others
 and `teeth` of an older one, whose noise still held quick orders.
 Those of `real` up to 71 had been run twice before, with the first versions of how repeated rows are
 treated and of how finely a motion is followed; their outcomes were seen. The calibration cases are of
