@@ -1,32 +1,43 @@
-"""A drive that moves its load to and fro, and rests between the moves."""
+"""Drives that a controller in cascade moves; one of them to and fro, with rests between the moves."""
+
+from typing import Any
+
+#: Standard deviations of good sensors, SI units.
+NOISE = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
+
+
+def positioned(trajectory: dict[str, Any], *, position_gain_per_s: float = 30.0) -> dict[str, Any]:
+    """A command that moves the output of a drive of size 20 along a trajectory."""
+    return {"motor": {
+        "type": "position",
+        "at": "output",
+        "trajectory": trajectory,
+        "controller": {
+            "type": "cascade",
+            "position_gain_per_s": position_gain_per_s,
+            "velocity_gain_nm_s_per_rad": 0.025,
+            "velocity_integral_gain_nm_per_rad": 0.5,
+        },
+    }}  # fmt: skip
+
 
 #: Between the moves the motor is held by its friction, and creeps to where it is to be.
 MOVES = {
     "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
-    "command": {"motor": {
-        "type": "position",
-        "at": "output",
-        "trajectory": {"type": "sequence", "moves": [
-            move
-            for distance_deg in (60, -90, 45, -15)
-            for move in (
-                {
-                    "type": "s_curve",
-                    "distance_deg": distance_deg,
-                    "maximum_velocity_deg_per_s": 90,
-                    "maximum_acceleration_deg_per_s2": 500,
-                    "maximum_jerk_deg_per_s3": 8000,
-                },
-                {"type": "hold", "duration_s": 0.3},
-            )
-        ]},
-        "controller": {
-            "type": "cascade",
-            "position_gain_per_s": 30,
-            "velocity_gain_nm_s_per_rad": 0.025,
-            "velocity_integral_gain_nm_per_rad": 0.5,
-        },
-    }},
+    "command": positioned({"type": "sequence", "moves": [
+        move
+        for distance_deg in (60, -90, 45, -15)
+        for move in (
+            {
+                "type": "s_curve",
+                "distance_deg": distance_deg,
+                "maximum_velocity_deg_per_s": 90,
+                "maximum_acceleration_deg_per_s2": 500,
+                "maximum_jerk_deg_per_s3": 8000,
+            },
+            {"type": "hold", "duration_s": 0.3},
+        )
+    ]}),
     "load": {"inertia_kg_m2": 0.5},
     "run": {"duration_s": 6.0, "sample_rate_hz": 1000.0},
 }  # fmt: skip

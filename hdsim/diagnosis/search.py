@@ -125,6 +125,8 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
         if len(found.named) == 1:
             tell(f"without {found.named[0].name}")
             found.better = base_alone(bench, base, found.fit)
+            if found.better is not None:
+                return found
         for one in found.named:
             if one.name in one.alike:
                 one.group = dict.fromkeys(sorted(one.alike - {one.name}), 1.0) | one.group

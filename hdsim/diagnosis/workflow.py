@@ -177,15 +177,18 @@ def _diagnosed(
         return tell
 
     with running:
-        while (found := search(bench, base.fit, during)) is None or found.better is not None:
-            during("refit", "re-fitting the parameters of the model")
+        while True:
+            found = search(bench, base.fit, during)
             if found is None:
                 # The first effects have shown samples that do not count.
+                during("refit", "re-fitting the parameters of the model")
                 base = refit(bench, start)
             elif found.better is not None:
                 # The effect has only shown the base's own numbers a better minimum.
                 own = base_intervals(found.better, base.freedoms)
                 base = replace(base, fit=found.better, intervals=own)
+            else:
+                break
     # Its own numbers are those that effects have asked for, too.
     base = replace(base, freedoms=[*base.freedoms, *asked_for(start, found.fit.state.added)])
     with step("prove", "validating on held-out data"):

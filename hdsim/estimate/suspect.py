@@ -69,8 +69,9 @@ def delays(bench: Bench, intervals: Sequence[Interval]) -> list[Problem]:
     record = bench.predictors[0].record.as_read
     found = []
     for one in intervals:
-        late = one.low > 0.0 or one.high < 0.0  # neither where the data do not bound it
-        if not one.delay_of or not late or abs(one.value) < LATE * record.period_s:
+        if not (one.delay_of and one.determined) or one.low <= 0.0 <= one.high:
+            continue
+        if abs(one.value) < LATE * record.period_s:
             continue
         side = "late" if one.value > 0 else "early"
         message = (

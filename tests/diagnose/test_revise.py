@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
-from moves import MOVES
+from moves import MOVES, NOISE
 from noisy import noisy
 
 import hdsim
@@ -165,8 +165,7 @@ def test_half_a_stiffness_is_no_friction():
     true = Scenario.model_validate(MOVES | {"load": load, "run": MOVES["run"] | {"duration_s": 8.0}})
     halves = {"stiffness_k1_nm_per_rad": 8000.0, "stiffness_k2_nm_per_rad": 12500.0}
     base = true.with_({f"drive.torsion.{name}": value for name, value in halves.items()})
-    noise = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
-    verdict = diagnose([noisy(hdsim.simulate(true), noise, seed=1)], base).verdict
+    verdict = diagnose([noisy(hdsim.simulate(true), NOISE, seed=1)], base).verdict
     assert verdict.verdict == "parameter"
     assert verdict.moved == ["drive.torsion.stiffness_k1_nm_per_rad"]
     assert verdict.parameters[verdict.moved[0]].value == pytest.approx(16000.0, rel=0.01)

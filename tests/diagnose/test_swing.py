@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from moves import positioned
 from noisy import noisy
 
 import hdsim
@@ -28,19 +29,10 @@ BASE = {
     "drive": {
         "preset": "seed-2021", "mesh": {"model": "lumped"}, "torsion": {"damping_nm_s_per_rad": 15.0},
     },
-    "command": {"motor": {
-        "type": "position",
-        "at": "output",
-        "trajectory": {
-            "type": "sine", "amplitude_deg": 15.0, "frequency_hz": 0.5, "phase_deg": -90, "offset_deg": 15.0,
-        },
-        "controller": {
-            "type": "cascade",
-            "position_gain_per_s": 40,
-            "velocity_gain_nm_s_per_rad": 0.025,
-            "velocity_integral_gain_nm_per_rad": 0.5,
-        },
-    }},
+    "command": positioned(
+        {"type": "sine", "amplitude_deg": 15.0, "frequency_hz": 0.5, "phase_deg": -90, "offset_deg": 15.0},
+        position_gain_per_s=40,
+    ),
     "load": {"inertia_kg_m2": 0.5},
     "run": {"duration_s": 8.0, "sample_rate_hz": 500.0},
 }  # fmt: skip

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from moves import positioned
 from noisy import noisy
 from scipy.interpolate import PPoly
 
@@ -18,17 +19,7 @@ from hdsim.scenario import Scenario
 NOISE = {"motor_angle": 6e-4, "output_angle": 1e-6, "motor_torque": 3e-3}
 SCENARIO = Scenario.model_validate({
     "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
-    "command": {"motor": {
-        "type": "position",
-        "at": "output",
-        "trajectory": {"type": "sine", "amplitude_deg": 25.0, "frequency_hz": 0.4},
-        "controller": {
-            "type": "cascade",
-            "position_gain_per_s": 30,
-            "velocity_gain_nm_s_per_rad": 0.025,
-            "velocity_integral_gain_nm_per_rad": 0.5,
-        },
-    }},
+    "command": positioned({"type": "sine", "amplitude_deg": 25.0, "frequency_hz": 0.4}),
     "load": {"inertia_kg_m2": 0.5},
     "run": {"duration_s": 10.0, "sample_rate_hz": 250.0},
 })  # fmt: skip

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import moves
 import numpy as np
 import pytest
-from moves import MOVES
 from noisy import noisy
 
 import hdsim
@@ -43,10 +43,7 @@ def base(tmp_path_factory):
 
 
 def recorded(scenario):
-    run, rng = hdsim.simulate(scenario), np.random.default_rng(2)
-    return Record(
-        "r", run.time, {c: run[c] + s * rng.standard_normal(len(run.time)) for c, s in NOISE.items()}
-    )
+    return noisy(hdsim.simulate(scenario), NOISE, seed=2)
 
 
 @pytest.fixture(scope="module")
@@ -194,20 +191,19 @@ def test_of_a_long_rest_no_sample_counts_as_turning():
     assert not found[3300:].any()
 
 
-def without_friction(moves):
+def without_friction():
     none = {"coulomb_nm": 0.0, "viscous_nm_s_per_rad": 0.0, "load_coefficient": 0.0}
-    return Scenario.model_validate(moves | {"drive": moves["drive"] | {"friction": none}})
+    return Scenario.model_validate(moves.MOVES | {"drive": moves.MOVES["drive"] | {"friction": none}})
 
 
 @pytest.mark.slow
 def test_a_base_without_friction_is_not_asked_for_what_holds_a_shaft_at_rest():
-    run = hdsim.simulate(Scenario.model_validate(MOVES))
-    noise = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
-    verdict = diagnose([noisy(run, noise, seed=1)], without_friction(MOVES)).verdict
+    run = hdsim.simulate(Scenario.model_validate(moves.MOVES))
+    verdict = diagnose([noisy(run, moves.NOISE, seed=1)], without_friction()).verdict
     assert [one.name for one in verdict.effects] == ["input_coulomb_viscous"]
     gap = verdict.gap["motor_torque"]
     assert gap.after < 1.2 * gap.noise < 0.1 * gap.before
-    true = Scenario.model_validate(MOVES).drive.friction
+    true = Scenario.model_validate(moves.MOVES).drive.friction
     viscous = verdict.effects[0].parameters["viscous_nm_s_per_rad"]
     assert viscous.interval[0] < true.viscous_nm_s_per_rad < viscous.interval[1]
 
@@ -215,9 +211,9 @@ def test_a_base_without_friction_is_not_asked_for_what_holds_a_shaft_at_rest():
 @pytest.mark.slow
 @pytest.mark.parametrize("held_nm", [0.03, 0.0])
 def test_rests_are_left_out_where_more_is_missed_there(held_nm):
-    run = hdsim.simulate(Scenario.model_validate(MOVES))
+    run = hdsim.simulate(Scenario.model_validate(moves.MOVES))
     record = noisy(run, {"motor_angle": 3e-5, "motor_torque": 3e-3}, seed=1)
-    bench = bench_for([record], [], without_friction(MOVES))
+    bench = bench_for([record], [], without_friction())
     (series,) = bench.series
     counted = series.train | series.hold
     noise = 3e-3 * np.random.default_rng(4).standard_normal(len(record.time))
@@ -234,10 +230,9 @@ def test_rests_are_left_out_where_more_is_missed_there(held_nm):
 def test_beside_an_effect_what_holds_a_shaft_is_no_friction_that_remembers():
     """Behind the kinematic error nothing more is missed at rest; LuGre friction would be the next name."""
     error = {"components": [{"order": 2, "amplitude_arcmin": 0.6, "phase_deg": 30.0}]}
-    moves = MOVES | {"run": MOVES["run"] | {"duration_s": 8.0}}
-    run = hdsim.simulate(Scenario.model_validate(moves | {"effects": {"kinematic_error": error}}))
-    noise = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
-    verdict = diagnose([noisy(run, noise, seed=1)], Scenario.model_validate(moves)).verdict
+    longer = moves.MOVES | {"run": moves.MOVES["run"] | {"duration_s": 8.0}}
+    run = hdsim.simulate(Scenario.model_validate(longer | {"effects": {"kinematic_error": error}}))
+    verdict = diagnose([noisy(run, moves.NOISE, seed=1)], Scenario.model_validate(longer)).verdict
     assert [one.name for one in verdict.effects] == ["kinematic_error"]
     assert verdict.gap["motor_torque"].after < 1.2 * verdict.gap["motor_torque"].noise
 
