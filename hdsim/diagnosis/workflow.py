@@ -148,7 +148,7 @@ def _diagnosed(
         seconds[name] = round(seconds.get(name, 0.0) + time.process_time() - started, 3)
 
     with step("check", "checking the data"):
-        records, held, checks = checked(measured, scenario, holdout=holdout, force=force)
+        records, held, checks = checked(measured, scenario, holdout=holdout, load=load, force=force)
         problems = [problem for check in checks for problem in check.problems]
     start = state_of(scenario)
     with step("compare", "predicting the measured channels"):

@@ -154,7 +154,7 @@ def estimate(
     if black_box:
         trees()
     tell("checking the data")
-    records, held, checks = checked(measured, scenario, holdout=holdout, force=force)
+    records, held, checks = checked(measured, scenario, holdout=holdout, load=load, force=force)
     tell("predicting the measured channels")
     bench, start = bench_for(records, held, scenario, load, zeros=zeros), state_of(scenario)
     locked = all(predictor.plan.locked for predictor in bench.predictors)

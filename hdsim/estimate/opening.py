@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.bridges import cut
 from hdsim.estimate.check import check_records
 from hdsim.estimate.data_problems import Check
 from hdsim.estimate.offsets import Zeros
-from hdsim.estimate.plan import LoadSource, Locked
+from hdsim.estimate.plan import LoadSource, Locked, given
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record, record_from
 from hdsim.estimate.reliability import knots_apart_s
@@ -28,9 +30,10 @@ def checked(
     scenario: Scenario,
     *,
     holdout: Sequence[Recording | Record] = (),
+    load: LoadSource | None = None,
     force: bool = False,
 ) -> tuple[list[Record], list[Record], list[Check]]:
-    """Training records, held-out records, and what is wrong with them.
+    """Training records, held-out records, and what is wrong with them; cut where gaps cannot be bridged.
 
     Raises:
         InputError: there is none, or one contradicts itself (see ``force``).
@@ -41,11 +44,22 @@ def checked(
     if not records:
         raise InputError("no measured record is given")
     checks = check_records([*records, *held], scenario.drive.ratio)
+    _refuse(checks, force)
+    source: dict[str, Any] = {"load": load, "locked": locked_side(scenario)}
+    pieces = [
+        cut(record, given(record, **source), check)
+        for record, check in zip([*records, *held], checks, strict=True)
+    ]
+    _refuse(checks, force)
+    training, holding = pieces[: len(records)], pieces[len(records) :]
+    return [*chain(*training)], [*chain(*holding)], checks
+
+
+def _refuse(checks: Sequence[Check], force: bool) -> None:
     errors = [problem for check in checks for problem in check.errors]
     if errors and not force:
         lines = "\n".join(f"{p.record}: {p.channel}: {p.kind}: {p.message}" for p in errors)
         raise InputError(f"{lines}\ncorrect the mapping or the data, or continue in spite of it (--force)")
-    return records, held, checks
 
 
 def locked_side(scenario: Scenario) -> Locked:

@@ -78,3 +78,18 @@ def _motor_locked(record: Record, moving: set[str]) -> Plan:
         f"found {', '.join(sorted(moving)) or 'nothing that varies'} (a load that is measured at the output, "
         "without inertia between, may be given as output_torque with its sign reversed)"
     )
+
+
+def given(record: Record, *, load: LoadSource | None = None, locked: Locked = "") -> tuple[str, ...]:
+    """Channels of a record that a model is told (``plan_for``), those that something can be read of.
+
+    Args:
+        record: the measured run.
+        load: see ``plan_for``.
+        locked: the side that the scenario locks, if any.
+
+    Raises:
+        InputError: nothing can be predicted.
+    """
+    plan = plan_for(record, load=load, locked=locked)
+    return plan.motion, *(() if plan.load == "scenario" else (plan.load,))

@@ -94,9 +94,14 @@ class Predictor:
         values = self._reading = self._means.behind(record.filled(plan.motion)) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
-        rate = None if rate is None else (self._means.behind(rate[0]), rate[1])
-        through = spline_through(record.time, values, motion=moves, step=step, rate=rate, apart_s=apart_s)
+        #: Samples that hold a reading of the motion, shape (n,); the spline is made through these.
+        self._read = record.trusted[plan.motion].copy()
+        self._read[[0, -1]] = True
+        time, read = record.time[self._read], values[self._read]
+        rate = None if rate is None else (self._means.behind(rate[0])[self._read], rate[1][self._read])
+        through = spline_through(time, read, motion=moves, step=step, rate=rate, apart_s=apart_s)
         self._spline, self.likeliest = through
+        values[~self._read] = self._spline(record.time[~self._read])
         breaks, coefficients = pieces_of(self._spline)
         #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
         self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
@@ -174,13 +179,13 @@ class Predictor:
     @property
     def samples_a_knot(self) -> float:
         """Samples between knots of the prescribed motion, on average."""
-        return len(self.record.time) / len(self._spline.c)
+        return int(self._read.sum()) / len(self._spline.c)
 
     @property
     def angle_noise(self) -> float:
         """What readings of the prescribed motion differ by from it, root mean square, rad of the motor."""
         apart = self._factor * self._reading - self.motor_angle
-        return float(np.std(apart))
+        return float(np.std(apart[self._read]))
 
     def _moved(self, rng: np.random.Generator) -> Predictor:
         """The same record with the prescribed motion alone drawn anew."""
@@ -188,7 +193,8 @@ class Predictor:
         if self.likeliest is not None:
             coefficients: Array | None = pieces_of(self.likeliest.disturbed(rng))[1]
         else:
-            coefficients = drawn_anew(self.record.time, self._reading, self._spline, rng)
+            read = self._read
+            coefficients = drawn_anew(self.record.time[read], self._reading[read], self._spline, rng)
         if coefficients is not None:
             found._coefficients = self._factor * coefficients
             found.turn(float(self.motor_angle[0] - self._factor * self._spline(self.record.time[0])))

@@ -60,7 +60,8 @@ def thinned(record: Record, count: int) -> Record:
     time = means(record.time)
     return Record(
         record.name, time - time[0], channels, trusted, record.ratio, source=record, readings=count,
-        begins_s=float(time[0]), joints={name: means(values) for name, values in record.joints.items()},
+        begins_s=record.begins_s + float(time[0]),
+        joints={name: means(values) for name, values in record.joints.items()},
     )  # fmt: skip
 
 
@@ -154,6 +155,6 @@ def _lost(record: Record, channel: str, count: int) -> float:
 
     few = thinned(record, count)
     rows = len(few.time) * count
-    course = CubicSpline(few.time + few.begins_s, few.channels[channel])(record.time[:rows])
+    course = CubicSpline(few.time + few.begins_s - record.begins_s, few.channels[channel])(record.time[:rows])
     good = record.trusted[channel][:rows]
     return float(np.mean((record.filled(channel)[:rows] - course)[good] ** 2))

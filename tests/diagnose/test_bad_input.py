@@ -138,7 +138,7 @@ BACK = {"t": sound()["t"][::-1]}
 TWICE = {"t": np.repeat(sound()["t"][::2], 2)}
 NAN, STILL = np.full(N, np.nan), np.full(N, 0.1)
 LATE = {"t": np.where(np.arange(N) < 700, sound()["t"], sound()["t"] + 1e9)}
-PAUSE = {"t": np.where(np.arange(N) < 700, sound()["t"], sound()["t"] + 2.0)}
+PAUSES = {"t": sound()["t"] + 2.0 * (np.arange(N) // 150)}
 NOISE = 1e-4 * np.random.default_rng(1).standard_normal(N)
 
 
@@ -151,7 +151,7 @@ NOISE = 1e-4 * np.random.default_rng(1).standard_normal(N)
         ({"t": NAN}, ["sample 1 has no time"]),
         ({"t": sound()["t"] * 1e-3}, ["1500 samples over 0.003 s", "at least 200 samples over 0.5 s,"]),
         ({"t": sound()["t"] * 1e3}, ["time: clock", "one sample every 2 s", "ms for s"]),
-        (PAUSE, ["time: gap", "the longest 2 s", "cut the recording there"]),
+        (PAUSES, ["motor_angle: gap", "missing for 2 s from 0.298 s", "allowed: at least 50 %"]),
         (LATE, ["longest gap, 1e+09 s, begins at 1.398 s", "cut the recording there"]),
         ({"torque": NAN}, ["motor_torque: missing: 1500 of 1500"]),
         ({"motor": NAN}, ["motor_angle: missing: 1500 of 1500"]),

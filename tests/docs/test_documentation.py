@@ -22,7 +22,8 @@ from hdsim.diagnosis.experiments import LONGEST_S
 from hdsim.diagnosis.following import WEAK
 from hdsim.diagnosis.verdict import IdentifiedEffect, Verdict
 from hdsim.effects import catalogue
-from hdsim.estimate.check import LONGEST_GAP_S, SLOWEST_HZ
+from hdsim.estimate.bridges import LOST, PLACES
+from hdsim.estimate.check import SLOWEST_HZ
 from hdsim.estimate.found import Gap
 from hdsim.estimate.records import FEWEST_SAMPLES, SHORTEST_S
 from hdsim.scenario import Scenario, json_schema
@@ -98,7 +99,10 @@ def test_named_files_are_there(page: str) -> None:
 def test_the_page_of_the_diagnosis_has_the_programs_own_figures() -> None:
     text = " ".join((DOCS / "diagnose.md").read_text(encoding="utf-8").split())
     least = f"{FEWEST_SAMPLES} samples over {SHORTEST_S:g} s at {SLOWEST_HZ:g} Hz or more"
-    assert f"{least}, without gaps above {LONGEST_GAP_S:g} s" in text
+    assert f"{least}. A record is cut at [gaps](#gaps)" in text
+    assert f"tried in up to {PLACES} other places" in text
+    assert f"pieces below {FEWEST_SAMPLES} samples or {SHORTEST_S:g} s are left out" in text
+    assert f"lose more than {100 * LOST:g} % of its readings" in text
     assert f"a single effect below {WEAK:.0%}".replace("%", " %") in text
     assert f"experiments of up to {LONGEST_S:g} s" in text
     very, sure, fairly = (round(100 * least) for least, _ in SURE[:3])
