@@ -54,7 +54,8 @@ def hear_standstill(
 ) -> Fit:
     """Take the sign of friction as sharp as the speed is known, where that is clearly likelier.
 
-    The motor's torque at rest counts no longer then.
+    The motor's torque at rest counts no longer then; nor where either sign is as good while the shaft turns,
+    and a second look found it missed at rest.
 
     Args:
         bench: the measured series, weighed; predictors and masks are changed.
@@ -89,8 +90,12 @@ def hear_standstill(
         asked = carried_on is None or _held(bench, found.predictions, turning)
         if asked:
             take(sharp)
-            asked = _matters(bench, before, bench.predict(given), turning)
+            matters = _matters(bench, before, bench.predict(given), turning)
             take(signs)
+            if not matters and carried_on is not None:
+                # Either sign is as good while the shaft turns, and none for what is missed at rest.
+                return carried_on(found) if _leave_out(bench, turning) else found
+            asked = matters
         if asked:
             _leave_out(bench, turning)
             # Both are carried on with the same samples.
