@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdsim.estimate.data_problems import Check, Problem
+from hdsim.estimate.data_problems import Check, Problem, Severity
 from hdsim.estimate.knots import uniform
 from hdsim.estimate.noise import noise_floor
-from hdsim.estimate.records import FEWEST_SAMPLES, SHORTEST_S, Record
+from hdsim.estimate.records import FEWEST_SAMPLES, SHORTEST_S, Record, long_enough
 from hdsim.estimate.spline import best_spline
 
 #: Steps between readings that are longer than this many periods are gaps.
@@ -42,49 +42,43 @@ def cut(record: Record, given: Sequence[str], found: Check) -> list[Record]:
         return [record]
     steps = np.diff(record.time[at])
     wide = np.flatnonzero(steps > GAP * record.period_s).tolist()
-    bridges = [_Bridge(record, channel) for channel in given] if len(wide) else []
+    bridges = [_Bridge(record, channel) for channel in given] if wide else []
     ends = [k for k in wide if not all(one.spans(at[k], at[k + 1]) for one in bridges)]
     pieces = [
-        slice(int(at[first]), int(at[last]) + 1)
+        slice(at[first], at[last] + 1)
         for first, last in zip([0, *(k + 1 for k in ends)], [*ends, len(at) - 1], strict=True)
     ]
-    kept = [rows for rows in pieces if _long_enough(record, rows)]
-    samples = sum(rows.stop - rows.start for rows in kept)
+    if not ends:
+        return [_piece(record, pieces[0], record.name)]
+    kept = [rows for rows in pieces if long_enough(record.time[rows])]
+    part = sum(rows.stop - rows.start for rows in kept) / len(at)
     where = ", ".join(f"{steps[k]:.3g} s from {record.time[at[k]]:.4g} s" for k in ends[:3])
     where += ", ..." if len(ends) > 3 else ""
     said = f"{' or '.join(given)} is missing for {where}, which no spline bridges within its noise"
-    if ends and samples < LOST * len(at):
-        found.problems.append(
-            Problem(
-                record.name, given[0], "gap", "error",
-                f"{said}; between {len(ends)} such gaps, pieces of at least {FEWEST_SAMPLES} samples and "
-                f"{SHORTEST_S:g} s have {100 * samples / len(at):.2g} % of the readings (allowed: at least "
-                f"{100 * LOST:g} %)", len(ends),
-            )
-        )  # fmt: skip
-        return [record]
-    if ends:
-        lost = len(pieces) - len(kept)
+    refused = part < LOST
+    if refused:
+        said += (
+            f"; between {len(ends)} such gaps, pieces of at least {FEWEST_SAMPLES} samples and "
+            f"{SHORTEST_S:g} s have {100 * part:.2g} % of the readings (allowed: at least {100 * LOST:g} %)"
+        )
+    else:
         said += f": {len(kept)} pieces are records of their own"
-        if lost:
-            said += f", {lost} shorter than {FEWEST_SAMPLES} samples or {SHORTEST_S:g} s are left out"
-        found.problems.append(Problem(record.name, given[0], "gap", "warning", said, len(ends)))
-    return [_piece(record, rows, named=bool(ends)) for rows in kept]
+        if len(kept) < len(pieces):
+            short = len(pieces) - len(kept)
+            said += f", {short} shorter than {FEWEST_SAMPLES} samples or {SHORTEST_S:g} s are left out"
+    severity: Severity = "error" if refused else "warning"
+    found.problems.append(Problem(record.name, given[0], "gap", severity, said, len(ends)))
+    if refused:
+        return [record]
+    return [_piece(record, rows, f"{record.name} from {record.time[rows.start]:.4g} s") for rows in kept]
 
 
-def _long_enough(record: Record, rows: slice) -> bool:
-    count = rows.stop - rows.start
-    return (
-        count >= FEWEST_SAMPLES and float(record.time[rows.stop - 1] - record.time[rows.start]) >= SHORTEST_S
-    )
-
-
-def _piece(record: Record, rows: slice, *, named: bool) -> Record:
-    """Some successive rows of a record."""
+def _piece(record: Record, rows: slice, name: str) -> Record:
+    """Some successive rows of a record, under a name."""
     begins = float(record.time[rows.start])
     return replace(
         record,
-        name=f"{record.name} from {begins:.4g} s" if named else record.name,
+        name=name,
         time=record.time[rows] - begins,
         channels={channel: values[rows] for channel, values in record.channels.items()},
         trusted={channel: good[rows] for channel, good in record.trusted.items()},

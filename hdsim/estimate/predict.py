@@ -94,7 +94,7 @@ class Predictor:
         values = self._reading = self._means.behind(record.filled(plan.motion)) + 2.0 * np.pi * turns
         # Ramps against a locked output creep: they reverse without a jump that could be seen.
         moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
-        #: Samples that hold a reading of the motion, shape (n,); the spline is made through these.
+        #: Samples (n,) that hold a reading of the motion, and the record's ends: the spline's.
         self._read = record.trusted[plan.motion].copy()
         self._read[[0, -1]] = True
         time, read = record.time[self._read], values[self._read]
@@ -179,7 +179,7 @@ class Predictor:
     @property
     def samples_a_knot(self) -> float:
         """Samples between knots of the prescribed motion, on average."""
-        return int(self._read.sum()) / len(self._spline.c)
+        return np.count_nonzero(self._read) / len(self._spline.c)
 
     @property
     def angle_noise(self) -> float:

@@ -104,6 +104,11 @@ class Record:
         return np.interp(self.time, self.time[good], self.channels[channel][good])
 
 
+def long_enough(time: Array) -> bool:
+    """Whether a diagnosis can work with samples at these times, s, shape (n,)."""
+    return len(time) >= FEWEST_SAMPLES and float(np.ptp(time)) >= SHORTEST_S
+
+
 def record_from(recording: Recording, name: str = "") -> Record:
     """The contract's channels of a recording; a log of a simulated run gives what its sensors read.
 
@@ -115,7 +120,7 @@ def record_from(recording: Recording, name: str = "") -> Record:
     if not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0):
         raise InputError(f"{name}: time must be finite and strictly increasing")
     lasts = float(np.ptp(time)) if len(time) else 0.0
-    if len(time) < FEWEST_SAMPLES or lasts < SHORTEST_S:
+    if not long_enough(time):
         raise InputError(
             f"{name}: {len(time)} samples over {lasts:.3g} s; a diagnosis needs at least {FEWEST_SAMPLES} "
             f"samples over {SHORTEST_S:g} s, because {_WHY_SO_LONG}. Is the unit of its time right?"

@@ -87,23 +87,21 @@ def hear_standstill(
     turning = _turning(bench)
     with contextlib.suppress(PredictionError):
         # A first look needs no reason; what is asked of the found fit costs no prediction.
-        asked = carried_on is None or _held(bench, found.predictions, turning)
-        if asked:
+        if carried_on is None or _held(bench, found.predictions, turning):
             take(sharp)
             matters = _matters(bench, before, bench.predict(given), turning)
             take(signs)
-            if not matters and carried_on is not None:
+            if matters:
+                _leave_out(bench, turning)
+                # Both are carried on with the same samples.
+                smooth = end_of(found)
+                take(sharp)
+                sharper = end_of(anew())
+                if _likelier(bench, smooth.predictions, sharper.predictions):
+                    return sharper
+            elif carried_on is not None and _leave_out(bench, turning):
                 # Either sign is as good while the shaft turns, and none for what is missed at rest.
-                return carried_on(found) if _leave_out(bench, turning) else found
-            asked = matters
-        if asked:
-            _leave_out(bench, turning)
-            # Both are carried on with the same samples.
-            smooth = end_of(found)
-            take(sharp)
-            sharper = end_of(anew())
-            if _likelier(bench, smooth.predictions, sharper.predictions):
-                return sharper
+                return carried_on(found)
     take(signs)
     for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
         series.train, series.hold, series.sigma = train, hold, sigma
