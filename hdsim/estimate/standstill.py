@@ -54,8 +54,7 @@ def hear_standstill(
 ) -> Fit:
     """Take the sign of friction as sharp as the speed is known, where that is clearly likelier.
 
-    The motor's torque at rest counts no longer then; nor where either sign is as good while the shaft turns,
-    and a second look found it missed at rest.
+    The motor's torque at rest counts no longer then.
 
     Args:
         bench: the measured series, weighed; predictors and masks are changed.
@@ -87,21 +86,19 @@ def hear_standstill(
     turning = _turning(bench)
     with contextlib.suppress(PredictionError):
         # A first look needs no reason; what is asked of the found fit costs no prediction.
-        if carried_on is None or _held(bench, found.predictions, turning):
+        asked = carried_on is None or _held(bench, found.predictions, turning)
+        if asked:
             take(sharp)
-            matters = _matters(bench, before, bench.predict(given), turning)
+            asked = _matters(bench, before, bench.predict(given), turning)
             take(signs)
-            if matters:
-                _leave_out(bench, turning)
-                # Both are carried on with the same samples.
-                smooth = end_of(found)
-                take(sharp)
-                sharper = end_of(anew())
-                if _likelier(bench, smooth.predictions, sharper.predictions):
-                    return sharper
-            elif carried_on is not None and _leave_out(bench, turning):
-                # Either sign is as good while the shaft turns, and none for what is missed at rest.
-                return carried_on(found)
+        if asked:
+            _leave_out(bench, turning)
+            # Both are carried on with the same samples.
+            smooth = end_of(found)
+            take(sharp)
+            sharper = end_of(anew())
+            if _likelier(bench, smooth.predictions, sharper.predictions):
+                return sharper
     take(signs)
     for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
         series.train, series.hold, series.sigma = train, hold, sigma

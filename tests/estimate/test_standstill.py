@@ -277,22 +277,3 @@ def test_a_drive_that_creeps_and_rests_keeps_its_friction():
     assert bench.predictors[0].smoothing < 0.05
     value = found["drive.friction.coulomb_nm"].value
     assert value == pytest.approx(base.drive.friction.coulomb_nm, rel=0.05)
-
-
-def test_short_rests_at_reversals_do_not_count_where_no_sign_tells_them(tmp_path):
-    """The sign of friction is certain but at the reversals: there a drive that sticks is held for some ms."""
-    path = tmp_path / "base.yaml"
-    text = BASE.replace("csg-25-50", "csg-20-100").replace(
-        "gain_nm_s_per_rad: 0.044", "gain_nm_s_per_rad: 0.025"
-    )
-    start = text.index("    trajectory:")
-    sine = (
-        "    trajectory: {type: sine, amplitude_deg: 20, frequency_hz: 0.7, phase_deg: -90, offset_deg: 20}\n"
-    )
-    path.write_text(text[:start] + sine + text[text.index("    controller:") :], encoding="utf-8")
-    swings = hdsim.load_scenario(path)
-    log = noisy(hdsim.simulate(swings), {"motor_angle": 3e-5, "motor_torque": 3e-3}, seed=3)
-    _, series, rest = fitted(log, swings)
-    counted = series.train | series.hold
-    assert 0.8 < counted.mean() < 0.99
-    assert np.std(rest[counted]) < 1.1 * series.noise
