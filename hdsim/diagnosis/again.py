@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from hdsim.diagnosis.name import SAME, Named, confusable, freedom, level, name_effect
+from hdsim.diagnosis.contest import confusable
+from hdsim.diagnosis.name import SAME, Named, freedom, level, name_effect
 from hdsim.diagnosis.revise import without
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, screen
@@ -186,3 +187,12 @@ def gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
     first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
     noise = bench.noise_powers
     return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
+
+
+def shows(bench: Bench, before: Fit, now: Fit) -> bool:
+    """Whether a fit explains more than the noise in some channel, however little that is of what was missing.
+
+    What one formula leaves is not by chance another effect's law.
+    """
+    last, new = (bench.channel_powers(each.predictions) for each in (before, now))
+    return any(last[c] - new[c] > noise for c, noise in bench.noise_powers.items())

@@ -248,7 +248,7 @@ def fits_at_next_minima(bench: Bench, base: Fit, found: Fit, enough: float) -> l
                 gone: list[Fit] = []
                 for each in _begun_at(bench, base, there, other):
                     if not any(_same_way(bench, each, one) for one in gone):
-                        ends += _to_its_end(bench, base, each, enough)
+                        ends += to_its_end(bench, base, each, enough)
                         gone.append(each)
 
 
@@ -284,7 +284,7 @@ def _at_next_minima(added: Added) -> list[Added]:
     ]
 
 
-def _to_its_end(bench: Bench, base: Fit, found: Fit, enough: float) -> list[Fit]:
+def to_its_end(bench: Bench, base: Fit, found: Fit, enough: float) -> list[Fit]:
     """A fit carried on while that takes much off what it leaves: from another minimum the way is long.
 
     Args:

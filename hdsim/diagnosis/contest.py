@@ -18,9 +18,11 @@ from hdsim.diagnosis.candidate_fits import (
     given_point,
     point_at,
     rough_fits,
+    to_its_end,
 )
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, designs
+from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, strain
 from hdsim.estimate.predict import PredictionError
@@ -106,6 +108,7 @@ def contest(
     for name in further:
         tell(f"fitting {name} in full")
         keep(name, full_fits(bench, base, best[name][1]))
+    _look_alikes(bench, base, shortlist, {name: best[name] for name in further}, keep, tell)
     first = min(best, key=lambda name: best[name][0])
     if first in further:
         keep(first, fits_at_next_minima(bench, base, best[first][1], LEFT_IN * best[first][0]))
@@ -143,6 +146,46 @@ def _after_the_best(
             tell(f"fitting {one.name} from where {name} led")
             for shapes in product(*(shape.starts for shape in one.added.fitting.shapes)):
                 keep(one.name, fits_from(bench, base, there, replace(one.added, shapes=shapes)))
+
+
+def _look_alikes(
+    bench: Bench,
+    base: Fit,
+    shortlist: Sequence[Screened],
+    full: dict[str, tuple[float, Fit]],
+    keep: Callable[[str, list[Fit]], None],
+    tell: Callable[[str], object],
+) -> None:
+    """Fit look-alikes of the best anew from the numbers to which it led the base, where it misses the noise.
+
+    What a re-fit bent to stand in for one of them is back there, and the way of each from the bent numbers is
+    a valley with turns: which is at its end first need not be the better one.
+    """
+    if len(full) < 2:
+        return
+    name = min(full, key=lambda name: full[name][0])
+    loss, leader = full[name]
+    if loss <= REACHED * bench.noise_power:
+        return
+    rivals = [one for one in shortlist if one.name in full and confusable(one.name, name)]
+    if not rivals:
+        return
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        there = point_at(bench, base, leader.theta[: len(base.frees)])
+        for one in rivals:
+            tell(f"fitting {one.name} from where {name} led")
+            begun = [
+                found for each in (one, *one.others) for found in fits_from(bench, base, there, each.added)
+            ]
+            if begun:
+                nearest = min(begun, key=lambda each: bench.power(each.predictions))
+                keep(one.name, to_its_end(bench, base, nearest, LEFT_IN * loss))
+
+
+def confusable(one: str, other: str) -> bool:
+    """Whether one of two effects says that it can look like the other."""
+    known = catalogue()
+    return other in known[one].signature.confused_with or one in known[other].signature.confused_with
 
 
 def against_priors(bench: Bench, results: Sequence[tuple[str, Fit, Array]]) -> list[tuple[str, Fit, Array]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnosis.contest import Fitted, against_priors, contest
+from hdsim.diagnosis.contest import Fitted, against_priors, confusable, contest
 from hdsim.diagnosis.evidence import CandidateEvidence
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, Screening
@@ -247,12 +247,6 @@ def level(rest: Array, least: Array, same: float) -> bool:
 def freedom(found: Fit) -> int:
     """Free numbers of a fit's last effect."""
     return found.state.added[-1].freedom
-
-
-def confusable(one: str, other: str) -> bool:
-    """Whether one of two effects says that it can look like the other."""
-    known = catalogue()
-    return other in known[one].signature.confused_with or one in known[other].signature.confused_with
 
 
 def beside(residual: Residual, one: Screened, other: Screened) -> bool:

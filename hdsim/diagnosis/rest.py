@@ -3,23 +3,43 @@
 Behind what is missing, the torque that holds a shaft at rest is missed no more than the others, and a re-fit
 does not look for it (``hdsim.estimate.standstill``); beside the effect that was found it would be taken for
 the next one, a friction that remembers. So each time that effects were found it is asked once more.
+
+Where nothing else is missing, what holds the shaft would be taken for one more effect. A rest is a
+hypothesis of its own then: while the shaft turns the model is right as it is, and at rest friction is
+anything up to what breaks it loose (Filippov 1988).
 """
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Sequence
 from functools import partial
 
+import numpy as np
+
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Mask
 from hdsim.estimate.refit import at_its_end, together
-from hdsim.estimate.standstill import has_a_sign, hear_standstill, leave_out_rest
+from hdsim.estimate.standstill import (
+    CLEARLY,
+    count_only,
+    has_a_sign,
+    hear_standstill,
+    leave_out_rest,
+    missed_at_rest,
+    while_turning,
+)
 
 
-def hear_rest(bench: Bench, found: Fit) -> bool:
+def hear_rest(bench: Bench, before: Fit, found: Fit) -> bool:
     """Take the sign of friction sharper, or leave rests out, where that is clearly likelier now.
 
     Args:
         bench: the measured series, weighed; predictors and masks are changed where that is so.
+        before: the model before the last effect was found.
         found: the model with the effects that were found.
 
     Returns:
@@ -35,4 +55,64 @@ def hear_rest(bench: Bench, found: Fit) -> bool:
         lambda: together(bench, found, rough=True),
         partial(at_its_end, bench),
     )
-    return later is not found
+    return later is not found or _only_sticks(bench, before, found)
+
+
+def _only_sticks(bench: Bench, before: Fit, found: Fit) -> bool:
+    """Leave rests out where a model that only sticks is clearly likelier than the effect that was found."""
+    turning = while_turning(bench)
+    if not before.state.drive.friction.sticks or not missed_at_rest(bench, before.predictions, turning):
+        return False
+    kept = [(series.train, series.hold, series.sigma) for series in bench.series]
+    likelier = False
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        if count_only(bench, turning):
+            alone = at_its_end(bench, before)
+            trained = [train for train, *_ in kept]
+            likelier = _likelier_at_rest(bench, alone, found, trained) > CLEARLY
+    for series, (train, hold, sigma) in zip(bench.series, kept, strict=True):
+        series.sigma = sigma
+        if not likelier:
+            series.train, series.hold = train, hold
+    return likelier
+
+
+def _likelier_at_rest(bench: Bench, alone: Fit, found: Fit, trained: Sequence[Mask]) -> float:
+    """Logarithm of the odds of a model that only sticks against one with an effect more.
+
+    While the shaft turns both have the noise, or what the better one leaves. At rest the first one's torque
+    is as likely to be as predicted as to be anything up to what breaks the shaft loose.
+
+    Args:
+        bench: the measured series, of which samples at rest do not count.
+        alone: the model without the effect, fitted without those.
+        found: the model with it, fitted with them.
+        trained: samples that counted there, of each series, shape (n,) each.
+    """
+    odds = 0.0
+    friction = alone.state.drive.friction
+    for series, ours, theirs, before in zip(
+        bench.series,
+        bench.residuals(alone.predictions),
+        bench.residuals(found.predictions),
+        trained,
+        strict=True,
+    ):
+        turns, rests = series.train, before & ~series.train
+        if not len(ours) or not turns.any():
+            continue
+        power = max(min(float(np.mean(each[turns] ** 2)) for each in (ours, theirs)), series.noise**2)
+        apart = np.square(theirs) - np.square(ours)
+        worth = power * correlation(theirs[turns], series.block[turns])
+        odds += 0.5 * float(np.sum(apart[turns])) / worth
+        if not rests.any():
+            continue
+        breaks = friction.coulomb_nm + friction.load_coefficient * float(
+            np.max(np.abs(series.measured[before]))
+        )
+        peak = np.sqrt(2.0 * np.pi * power)
+        as_predicted = np.exp(-0.5 * ours[rests] ** 2 / power)
+        anything = peak / (2.0 * breaks + peak)
+        gains = 0.5 * theirs[rests] ** 2 / power + np.log(0.5 * as_predicted + 0.5 * anything)
+        odds += float(np.sum(gains)) / correlation(theirs[rests], series.block[rests])
+    return odds

@@ -14,7 +14,8 @@ from itertools import combinations
 
 import numpy as np
 
-from hdsim.diagnosis.name import MISMATCH, Named, confusable
+from hdsim.diagnosis.contest import confusable
+from hdsim.diagnosis.name import MISMATCH, Named
 from hdsim.estimate.asked import gone_with
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import worth_of_a_number

@@ -83,16 +83,16 @@ def hear_standstill(
     def end_of(fit: Fit) -> Fit:
         return fit if carried_on is None else carried_on(fit)
 
-    turning = _turning(bench)
+    turning = while_turning(bench)
     with contextlib.suppress(PredictionError):
         # A first look needs no reason; what is asked of the found fit costs no prediction.
-        asked = carried_on is None or _held(bench, found.predictions, turning)
+        asked = carried_on is None or missed_at_rest(bench, found.predictions, turning)
         if asked:
             take(sharp)
             asked = _matters(bench, before, bench.predict(given), turning)
             take(signs)
         if asked:
-            _leave_out(bench, turning)
+            count_only(bench, turning)
             # Both are carried on with the same samples.
             smooth = end_of(found)
             take(sharp)
@@ -124,11 +124,11 @@ def leave_out_rest(bench: Bench, found: Fit) -> bool:
     Returns:
         Whether something was left out.
     """
-    turning = _turning(bench, RESOLVED_RAD_PER_S)
-    return _held(bench, found.predictions, turning) and _leave_out(bench, turning)
+    turning = while_turning(bench, RESOLVED_RAD_PER_S)
+    return missed_at_rest(bench, found.predictions, turning) and count_only(bench, turning)
 
 
-def _turning(bench: Bench, least: float = 0.0) -> list[Mask]:
+def while_turning(bench: Bench, least: float = 0.0) -> list[Mask]:
     """Samples of each series that a shaft at rest has no part in, shape (n,) each; ``least`` as there."""
     return [
         ~at_rest(bench.predictors[s.record], least)
@@ -138,7 +138,7 @@ def _turning(bench: Bench, least: float = 0.0) -> list[Mask]:
     ]
 
 
-def _leave_out(bench: Bench, turning: Sequence[Mask]) -> bool:
+def count_only(bench: Bench, turning: Sequence[Mask]) -> bool:
     """Only samples while the shaft turns count; whether that leaves out any."""
     changed = False
     for series, rows in zip(bench.series, turning, strict=True):
@@ -174,7 +174,7 @@ def _likelier(bench: Bench, smooth: Sequence[Array], sharp: Sequence[Array]) -> 
     return better > CLEARLY
 
 
-def _held(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> bool:
+def missed_at_rest(bench: Bench, smooth: Sequence[Array], turning: Sequence[Mask]) -> bool:
     """Whether the motor's torque is clearly missed more at rest than while the shaft turns.
 
     Log-likelihood of two variances against one (Gaussian likelihood ratio), for as many independent samples

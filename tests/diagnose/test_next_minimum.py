@@ -121,7 +121,7 @@ def test_two_ways_to_one_place_are_not_both_carried_on(monkeypatch: pytest.Monke
     carried_on: list[Any] = []
     monkeypatch.setattr(candidate_fits, "point_at", lambda *_: None)
     monkeypatch.setattr(candidate_fits, "_begun_at", lambda *_: iter(begun))
-    monkeypatch.setattr(candidate_fits, "_to_its_end", lambda _, __, one, ___: carried_on.append(one) or [])
+    monkeypatch.setattr(candidate_fits, "to_its_end", lambda _, __, one, ___: carried_on.append(one) or [])
     bench: Any = SimpleNamespace(power=lambda predictions: predictions)
     base: Any = SimpleNamespace(frees=[])
     found = fit_at(0.3, 400.0)
