@@ -40,12 +40,13 @@ from hdsim.estimate.data_problems import Check
 from hdsim.estimate.drift import drifted
 from hdsim.estimate.fit import Fit, base_intervals
 from hdsim.estimate.found import DataProblem, Gap
+from hdsim.estimate.jumps import Jump, jumped, take_back_jumps
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
 from hdsim.estimate.plan import LoadSource
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.prove import gaps
+from hdsim.estimate.prove import gaps, unseen
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, align, refit, tie
 from hdsim.estimate.repeat import with_repeats
@@ -176,6 +177,7 @@ def _diagnosed(
         running.enter_context(step(name, text))
         return tell
 
+    jumps: list[Jump] = []
     with running:
         while True:
             found = search(bench, base.fit, during)
@@ -187,6 +189,11 @@ def _diagnosed(
                 # The effect has only shown the base's own numbers a better minimum.
                 own = base_intervals(found.better, base.freedoms)
                 base = replace(base, fit=found.better, intervals=own)
+            elif back := take_back_jumps(bench, found.fit.predictions):
+                # All that a model leaves: it bends the base, and hides what is smaller.
+                jumps += back
+                during("refit", "re-fitting the parameters of the model")
+                base = refit(bench, start)
             else:
                 break
     # Its own numbers are those that effects have asked for, too.
@@ -240,6 +247,7 @@ def _diagnosed(
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
     problems += [*doubts, *beginnings(bench), *one_way(bench), *moving_zeros(bench, current.predictions)]
+    problems += [*unseen(bench, predictions["after"]), *jumped(bench, jumps)]
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)

@@ -8,8 +8,10 @@ import numpy as np
 
 from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.found import Gap
-from hdsim.estimate.records import Array
+from hdsim.estimate.records import Array, Mask
+from hdsim.estimate.series import Series
 from hdsim.estimate.short_cut import whole_models
 from hdsim.estimate.state import State
 from hdsim.estimate.unwound import turned_to_zero
@@ -17,6 +19,8 @@ from hdsim.log.mapping import MEASURED
 
 #: Draws of blocks for the intervals.
 DRAWS = 500
+#: Ratio of what held-out and training records leave above which they do not show the same (chosen).
+APART = 3.0
 
 
 def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dict[str, list[Array]]]:
@@ -78,6 +82,41 @@ def borne_out(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> 
     slope = float(moments.sum()) / total
     away = moments - slope * powers
     return slope, float(np.sqrt(np.sum(away**2) * count / (count - 1))) / total
+
+
+def unseen(bench: Bench, predictions: Sequence[Array]) -> list[Problem]:
+    """Held-out records of which a model leaves much more than of the training records.
+
+    What they show no step has been given to see, and a verdict of it there is none.
+
+    Args:
+        bench: the measured series.
+        predictions: of all series.
+    """
+    found = []
+    residuals = bench.residuals(predictions, drift=True)
+    for channel in bench.channels:
+        own = [
+            (s, r) for s, r in zip(bench.series, residuals, strict=True) if s.channel == channel and len(r)
+        ]
+        trained = [_times_noise(s, r, s.train) for s, r in own if s.record < bench.training and s.train.any()]
+        for series, rest in own:
+            if not trained or series.record < bench.training or not series.hold.any():
+                continue
+            usual, times = max(trained), _times_noise(series, rest, series.hold)
+            if times > APART * max(usual, 1.0):
+                message = (
+                    f"held-out data are missed by {times:.3g} times the noise, training data by {usual:.2g} "
+                    "times: this motion shows what no training record does. Learn from one like it"
+                )
+                name = bench.predictors[series.record].record.name
+                found.append(Problem(name, channel, "held out", "warning", message))
+    return found
+
+
+def _times_noise(series: Series, rest: Array, rows: Mask) -> float:
+    """Root mean square of some samples of what is left of a series, in units of its noise."""
+    return float(np.sqrt(np.mean(rest[rows] ** 2))) / max(series.noise, 1e-300)
 
 
 def _held(bench: Bench, channel: str) -> list[int]:
