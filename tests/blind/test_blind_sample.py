@@ -9,7 +9,7 @@ from running import attempt, stored, task_of
 #: Short logs of every kind.
 SAMPLE = (
     pytest.param("numpy/parameter/-/3/0", marks=pytest.mark.study),
-    "numpy/effect/-/4/0",
+    "numpy/effect/-/34/50",
     pytest.param("numpy/null/-/7/0", marks=pytest.mark.study),
 )
 
