@@ -42,8 +42,6 @@ WITHIN_GAIN = 0.1
 #: Part of what is left that makes it the next effect's, even in the coordinates of those that are there, and
 #: that makes it one however little is left.
 MOST, NEARLY = 0.5, 0.8
-
-
 #: Part by which what a fit leaves must have fallen for it to be carried on.
 FALLS = 0.05
 

@@ -20,6 +20,8 @@ from hdsim.estimate.records import Array
 ALL = 0.9
 #: Standard deviations of a reading that a step must have to be told from a drift of the motion's spline.
 SEEN = 5.0
+#: Fewest samples on either side of it: a few that are off are spikes, or the motion's spline at its ends.
+FEWEST = 20
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def take_back_jumps(bench: Bench, predictions: list[Array]) -> list[Jump]:
     found = []
     for series, rest in zip(bench.series, bench.residuals(predictions), strict=True):
         rows = series.train | series.hold
-        if not len(rest) or not series.channel.endswith("angle") or rows.sum() < 2:
+        if not len(rest) or not series.channel.endswith("angle") or rows.sum() <= 2 * FEWEST:
             continue
         first, size, part = best_step(rest[rows], series.noise)
         if part < ALL or abs(size) < SEEN * series.reading:
@@ -61,19 +63,21 @@ def best_step(rest: Array, noise: float) -> tuple[int, float, float]:
     """The step that explains most of a residual.
 
     Args:
-        rest: shape (n,), at least two samples.
+        rest: shape (n,), more than twice ``FEWEST`` samples.
         noise: its standard deviation.
 
     Returns:
         First sample behind it, its size, and the part that it explains of what is more than the noise.
     """
     rest = rest - rest.mean()
-    n, before = len(rest), np.arange(1, len(rest))
-    power = np.cumsum(rest)[:-1] ** 2 * n / (before * (n - before))
-    first = int(np.argmax(power)) + 1
+    n = len(rest)
+    before = np.arange(FEWEST, n - FEWEST + 1)
+    power = np.cumsum(rest)[before - 1] ** 2 * n / (before * (n - before))
+    best = int(np.argmax(power))
+    first = int(before[best])
     beyond = float(np.sum(rest**2)) - n * noise**2
     size = float(rest[first:].mean() - rest[:first].mean())
-    return first, size, float(power[first - 1]) / beyond if beyond > 0.0 else 0.0
+    return first, size, float(power[best]) / beyond if beyond > 0.0 else 0.0
 
 
 def jumped(bench: Bench, jumps: list[Jump]) -> list[Problem]:

@@ -15,7 +15,7 @@ from sensing import SENSORS
 from hdsim.effects import catalogue
 
 #: Quick ones of each kind but the parameter's; the quickest first.
-QUICK = (7, 3, 4)
+QUICK = (3, 7, 4)
 
 
 @cache

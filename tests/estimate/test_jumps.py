@@ -30,6 +30,7 @@ BASE = {
         (lambda t: 5.0 * (t > 0.4), True),
         (lambda t: 5.0 * t, False),  # a drift
         (lambda t: 5.0 * np.sign(np.sin(9.0 * t)), False),  # a play, which changes sides
+        (lambda t: 60.0 * (t > 0.9985), False),  # two samples at the end
         (lambda t: 0.0 * t, False),
     ],
 )
