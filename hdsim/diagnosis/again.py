@@ -187,12 +187,3 @@ def gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
     first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
     noise = bench.noise_powers
     return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
-
-
-def shows(bench: Bench, before: Fit, now: Fit) -> bool:
-    """Whether a fit explains more than the noise in some channel, however little that is of what was missing.
-
-    What one formula leaves is not by chance another effect's law.
-    """
-    last, new = (bench.channel_powers(each.predictions) for each in (before, now))
-    return any(last[c] - new[c] > noise for c, noise in bench.noise_powers.items())

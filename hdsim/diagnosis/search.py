@@ -14,8 +14,8 @@ from functools import partial
 
 import numpy as np
 
-from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, shows
-from hdsim.diagnosis.candidate_fits import FARTHER, as_given
+from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
+from hdsim.diagnosis.candidate_fits import as_given
 from hdsim.diagnosis.contest import Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
@@ -31,7 +31,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
 from hdsim.estimate.orders import Line, lines_of, power_of
-from hdsim.estimate.refit import REACHED, align, reweigh, together, unlikelihood, with_delays
+from hdsim.estimate.refit import align, reweigh, together, unlikelihood, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 
 #: Most effects that one diagnosis adds, and most passes that it makes.
@@ -39,11 +39,8 @@ MOST_EFFECTS, MOST_STAGES = 4, 7
 #: Part of what a channel lacked at first that a later effect must explain where a smooth curve over the
 #: coordinates of the effects before it would, because no formula is exact.
 WITHIN_GAIN = 0.1
-#: Part of what is left that makes it the next effect's, even in the coordinates of those that are there, and
-#: that makes it one however little is left.
-MOST, NEARLY = 0.5, 0.8
-#: Part by which what a fit leaves must have fallen for it to be carried on.
-FALLS = 0.05
+#: Part of what is left that makes it the next effect's, even in the coordinates of those that are there.
+MOST = 0.5
 
 
 @dataclass
@@ -174,7 +171,9 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     found.named.append(named)
     current = named.fit
     if len(found.named) == 1:
-        current = sharpened(bench, _unbent(bench, current))
+        # A base that carried nothing could tell nothing of its springs.
+        current = together(bench, current, rough=True) if current.undetermined else current
+        current = sharpened(bench, current)
     current = refined(bench, base, current, partial(during, "fit"))
     align(bench, current)
     reweigh(bench, current)
@@ -187,22 +186,6 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         align(bench, current)
         reweigh(bench, current)
     return current
-
-
-def _unbent(bench: Bench, found: Fit) -> Fit:
-    """The model with its first effect carried on until the base's numbers are back.
-
-    A base that carried nothing could tell nothing of its springs. And what a re-fit had bent to stand in for
-    the effect comes back along a valley: what is left on the way is no trace of what else is missing.
-    """
-    falls = bool(found.undetermined) or bench.power(found.predictions) > REACHED * bench.noise_power
-    for _ in range(FARTHER):
-        if not falls:
-            break
-        before = bench.power(found.predictions)
-        found = together(bench, found, rough=True)
-        falls = REACHED * bench.noise_power < bench.power(found.predictions) < (1.0 - FALLS) * before
-    return found
 
 
 def _one_more(
@@ -258,9 +241,7 @@ def _one_more(
         named.of_lines = _of_lines(bench, current, named.fit, stage.location.lines)
         return named
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
-    if named.gain >= least or (found.named and named.of_left >= NEARLY and shows(bench, current, named.fit)):
-        return named
-    return None
+    return named if named.gain >= least else None
 
 
 def _over_the_given(
