@@ -1,4 +1,4 @@
-"""Drives that a controller in cascade moves; one of them to and fro, with rests between the moves."""
+"""Drives that a controller in cascade moves: to and fro with rests between the moves, and as a sine."""
 
 from typing import Any
 
@@ -40,4 +40,14 @@ MOVES = {
     ]}),
     "load": {"inertia_kg_m2": 0.5},
     "run": {"duration_s": 6.0, "sample_rate_hz": 1000.0},
+}  # fmt: skip
+
+#: It sticks for some milliseconds at each reversal, where the arm's weight is far from balanced.
+SWINGING = {
+    "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
+    "command": positioned(
+        {"type": "sine", "amplitude_deg": 20.0, "frequency_hz": 0.7, "phase_deg": -90, "offset_deg": 20.0}
+    ),
+    "load": {"inertia_kg_m2": 0.3, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
+    "run": {"duration_s": 8.0, "sample_rate_hz": 500.0},
 }  # fmt: skip

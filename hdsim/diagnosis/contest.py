@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -69,7 +69,7 @@ def contest(
     best = {n: (bench.power(found.predictions), found) for n, (found, _) in known.items() if n in names}
     shortlist = [one for one in shortlist if one.name not in best]
 
-    def keep(name: str, several: list[Fit]) -> None:
+    def keep(name: str, several: Iterable[Fit]) -> None:
         for each in several:
             loss = bench.power(each.predictions)
             if name not in best or loss < best[name][0]:
@@ -122,7 +122,7 @@ def _after_the_best(
     base: Fit,
     shortlist: Sequence[Screened],
     best: dict[str, tuple[float, Fit]],
-    keep: Callable[[str, list[Fit]], None],
+    keep: Callable[[str, Iterable[Fit]], None],
     tell: Callable[[str], object],
 ) -> None:
     """Fit laws of compliance from the numbers to which the best of them led the base.
@@ -138,14 +138,12 @@ def _after_the_best(
         return  # what is missing is none of them
     enough = (1.0 + LAGS) * max(loss, bench.noise_power)
     rivals = [one for one in series if best.get(one.name, (math.inf, None))[0] > enough]
-    if not rivals:
-        return
-    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-        there = point_at(bench, base, leader.theta[: len(base.frees)])
-        for one in rivals:
-            tell(f"fitting {one.name} from where {name} led")
-            for shapes in product(*(shape.starts for shape in one.added.fitting.shapes)):
-                keep(one.name, fits_from(bench, base, there, replace(one.added, shapes=shapes)))
+
+    def begun(there: Point, one: Screened) -> Iterator[Fit]:
+        for shapes in product(*(shape.starts for shape in one.added.fitting.shapes)):
+            yield from fits_from(bench, base, there, replace(one.added, shapes=shapes))
+
+    _from_where_it_led(bench, base, (name, leader), rivals, begun, keep, tell)
 
 
 def _look_alikes(
@@ -153,7 +151,7 @@ def _look_alikes(
     base: Fit,
     shortlist: Sequence[Screened],
     full: dict[str, tuple[float, Fit]],
-    keep: Callable[[str, list[Fit]], None],
+    keep: Callable[[str, Iterable[Fit]], None],
     tell: Callable[[str], object],
 ) -> None:
     """Fit look-alikes of the best anew from the numbers to which it led the base, where it misses the noise.
@@ -168,18 +166,33 @@ def _look_alikes(
     if loss <= REACHED * bench.noise_power:
         return
     rivals = [one for one in shortlist if one.name in full and confusable(one.name, name)]
+
+    def ended(there: Point, one: Screened) -> list[Fit]:
+        begun = [found for each in (one, *one.others) for found in fits_from(bench, base, there, each.added)]
+        nearest = min(begun, key=lambda each: bench.power(each.predictions), default=None)
+        return to_its_end(bench, base, nearest, LEFT_IN * loss) if nearest is not None else []
+
+    _from_where_it_led(bench, base, (name, leader), rivals, ended, keep, tell)
+
+
+def _from_where_it_led(
+    bench: Bench,
+    base: Fit,
+    best: tuple[str, Fit],
+    rivals: Sequence[Screened],
+    fits: Callable[[Point, Screened], Iterable[Fit]],
+    keep: Callable[[str, Iterable[Fit]], None],
+    tell: Callable[[str], object],
+) -> None:
+    """Fit rivals of the best from the numbers to which it led the base."""
     if not rivals:
         return
+    name, leader = best
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         there = point_at(bench, base, leader.theta[: len(base.frees)])
         for one in rivals:
             tell(f"fitting {one.name} from where {name} led")
-            begun = [
-                found for each in (one, *one.others) for found in fits_from(bench, base, there, each.added)
-            ]
-            if begun:
-                nearest = min(begun, key=lambda each: bench.power(each.predictions))
-                keep(one.name, to_its_end(bench, base, nearest, LEFT_IN * loss))
+            keep(one.name, fits(there, one))
 
 
 def confusable(one: str, other: str) -> bool:

@@ -1,10 +1,8 @@
 """An encoder that loses counts: said as a problem of the data, and taken back."""
 
-from copy import deepcopy
-
 import numpy as np
 import pytest
-from moves import positioned
+from moves import NOISE, SWINGING
 from noisy import noisy
 
 import hdsim
@@ -12,16 +10,7 @@ from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.jumps import ALL, best_step
 from hdsim.scenario import Scenario
 
-NOISE = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
 JUMP_RAD, AT_S = 2e-4, 4.2
-BASE = {
-    "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
-    "command": positioned(
-        {"type": "sine", "amplitude_deg": 20.0, "frequency_hz": 0.7, "phase_deg": -90, "offset_deg": 20.0}
-    ),
-    "load": {"inertia_kg_m2": 0.3, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
-    "run": {"duration_s": 8.0, "sample_rate_hz": 500.0},
-}
 
 
 @pytest.mark.parametrize(
@@ -46,7 +35,7 @@ def test_a_step_alone_is_a_jump(left, jumps):
 @pytest.mark.slow
 def test_a_drive_whose_encoder_loses_counts_lacks_nothing():
     """Seen without: "unknown", and 4 to 6 times the noise left."""
-    base = Scenario.model_validate(deepcopy(BASE))
+    base = Scenario.model_validate(SWINGING)
     record = noisy(hdsim.simulate(base), NOISE, seed=3)
     as_read = record.channels["output_angle"] + JUMP_RAD * (record.time > AT_S)
     record.channels["output_angle"] = as_read

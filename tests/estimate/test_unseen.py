@@ -3,7 +3,7 @@
 from copy import deepcopy
 
 import pytest
-from moves import positioned
+from moves import NOISE, positioned
 from noisy import noisy
 
 import hdsim
@@ -12,7 +12,6 @@ from hdsim.estimate.prove import unseen
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 
-NOISE = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
 BASE = {
     "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
     "command": positioned({"type": "sine", "amplitude_deg": 10.0, "frequency_hz": 0.7, "phase_deg": -90}),
