@@ -23,6 +23,7 @@ from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Mask
 from hdsim.estimate.refit import at_its_end, together
+from hdsim.estimate.series import Counted
 from hdsim.estimate.standstill import (
     CLEARLY,
     count_only,
@@ -63,17 +64,16 @@ def _only_sticks(bench: Bench, before: Fit, found: Fit) -> bool:
     turning = while_turning(bench)
     if not before.state.drive.friction.sticks or not missed_at_rest(bench, before.predictions, turning):
         return False
-    kept = [(series.train, series.hold, series.sigma) for series in bench.series]
+    counted = Counted(bench.series)
     likelier = False
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         if count_only(bench, turning):
             alone = at_its_end(bench, before)
-            trained = [train for train, *_ in kept]
-            likelier = _likelier_at_rest(bench, alone, found, trained) > CLEARLY
-    for series, (train, hold, sigma) in zip(bench.series, kept, strict=True):
-        series.sigma = sigma
-        if not likelier:
-            series.train, series.hold = train, hold
+            likelier = _likelier_at_rest(bench, alone, found, counted.trained) > CLEARLY
+    if likelier:
+        counted.weigh_as_before()
+    else:
+        counted.put_back()
     return likelier
 
 

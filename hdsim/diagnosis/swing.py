@@ -17,6 +17,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import together
+from hdsim.estimate.series import Counted
 
 #: Part of what a model leaves beyond the noise that is most of it.
 MOST = 0.5
@@ -32,7 +33,7 @@ def hear_swing(bench: Bench, found: Fit) -> bool:
     Returns:
         Whether something was left out.
     """
-    kept, begins_s = [(series.train, series.hold) for series in bench.series], dict(bench.begins_s)
+    counted, begins_s = Counted(bench.series), dict(bench.begins_s)
     before = _beyond(bench, found)
     if before <= 0.0:
         return False
@@ -43,8 +44,7 @@ def hear_swing(bench: Bench, found: Fit) -> bool:
             found = together(bench, found, rough=True)
         if bench.begins_s != begins_s and _beyond(bench, found) < (1.0 - MOST) * before:
             return True
-    for series, (train, hold) in zip(bench.series, kept, strict=True):
-        series.train, series.hold = train, hold
+    counted.put_back()
     bench.begins_s = begins_s
     return False
 

@@ -6,8 +6,10 @@ damping is a guess; a fit would bend every number of the model to follow it. So 
 law. Of a hundred stretches of a record that are all alike, the first leaves more than each of the ninety
 beyond the first tenth in one case of 91 (a rank test: E. L. Lehmann, *Nonparametrics*, Springer 2006,
 section 1.2). Then it does not count, nor do those that follow it up to the first that leaves no more than
-they do. By chance that costs a hundredth of a record; where something missing acts at the beginning most, a
-tenth of it at most.
+they do. Each channel is asked by itself: what a shaft at rest leaves in another one hides no vibration. By
+chance that costs a hundredth of a record; where something missing acts at the beginning most, a tenth of it
+at most. Only what dies down meanwhile may be followed further, as a lightly damped vibration in a short
+record must be: what is left of it would bend the damping.
 """
 
 from __future__ import annotations
@@ -24,6 +26,9 @@ from hdsim.estimate.standstill import at_rest
 
 #: Stretches of a record, and those of them that may be left out; fewest samples in one of them.
 STRETCHES, EARLY, SAMPLES = 100, 10, 4
+#: Stretches that what dies down may take, and what of the first one's power the last one then has at most: in
+#: as many again it has less than a tenth.
+LATEST, DIES = 30, 0.3
 
 
 def hear_beginning(bench: Bench, predictions: Sequence[Array], *, first: int = 0) -> bool:
@@ -45,20 +50,22 @@ def hear_beginning(bench: Bench, predictions: Sequence[Array], *, first: int = 0
         time = predictor.record.time
         if len(time) < SAMPLES * STRETCHES or _at_rest(predictor):
             continue
-        power, count = np.zeros(STRETCHES), np.zeros(STRETCHES)
         own = [k for k, s in enumerate(bench.series) if s.record == index and len(residuals[k])]
         # Stretches of as many samples that count, or the shorter ones would scatter more.
         weight = np.sum([bench.series[k].train | bench.series[k].hold for k in own], axis=0).cumsum()
         stretch = np.minimum((weight - 1) * STRETCHES // max(int(weight[-1]), 1), STRETCHES - 1).clip(0)
+        late, most = 0, EARLY
         for series, rest in ((bench.series[k], residuals[k]) for k in own):
             rows = series.train | series.hold
-            power += np.bincount(stretch[rows], (rest[rows] / series.sigma) ** 2, STRETCHES)
-            count += np.bincount(stretch[rows], minlength=STRETCHES)
-        mean = np.divide(power, count, out=np.zeros(STRETCHES), where=count > 0)
-        quiet = np.flatnonzero(mean[:EARLY] <= mean[EARLY:].max())
-        late = int(quiet[0]) if len(quiet) else EARLY
+            power = np.bincount(stretch[rows], rest[rows] ** 2, STRETCHES)
+            count = np.bincount(stretch[rows], minlength=STRETCHES)
+            mean = np.divide(power, count, out=np.zeros(STRETCHES), where=count > 0)
+            quiet = np.flatnonzero(mean[:EARLY] <= mean[EARLY:].max())
+            late = max(late, int(quiet[0]) if len(quiet) else EARLY)
+            if late and mean[EARLY - 1] < DIES * mean[0]:
+                most = LATEST
         begins_s = min(
-            time[int(np.argmax(stretch >= late))] - time[0], (time[-1] - time[0]) * EARLY / STRETCHES
+            time[int(np.argmax(stretch >= late))] - time[0], (time[-1] - time[0]) * most / STRETCHES
         )
         if late == 0 or begins_s <= bench.begins_s.get(index, 0.0):
             continue

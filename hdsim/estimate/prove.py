@@ -85,7 +85,7 @@ def borne_out(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> 
 
 
 def unseen(bench: Bench, predictions: Sequence[Array]) -> list[Problem]:
-    """Held-out records of which a model leaves much more than of the training records.
+    """Held-out records and stretches of which a model leaves much more than of what fits saw.
 
     What they show no step has been given to see, and a verdict of it there is none.
 
@@ -99,15 +99,16 @@ def unseen(bench: Bench, predictions: Sequence[Array]) -> list[Problem]:
         own = [
             (s, r) for s, r in zip(bench.series, residuals, strict=True) if s.channel == channel and len(r)
         ]
-        trained = [_times_noise(s, r, s.train) for s, r in own if s.record < bench.training and s.train.any()]
+        trained = [_times_noise(s, r, s.train) for s, r in own if s.train.any()]
         for series, rest in own:
-            if not trained or series.record < bench.training or not series.hold.any():
+            if not trained or not series.hold.any():
                 continue
             usual, times = max(trained), _times_noise(series, rest, series.hold)
             if times > APART * max(usual, 1.0):
+                kind = "record" if series.record >= bench.training else "stretch"
                 message = (
                     f"held-out data are missed by {times:.3g} times the noise, training data by {usual:.2g} "
-                    "times: this motion shows what no training record does. Learn from one like it"
+                    f"times: this motion shows what no training {kind} does. Learn from one like it"
                 )
                 name = bench.predictors[series.record].record.name
                 found.append(Problem(name, channel, "held out", "warning", message))

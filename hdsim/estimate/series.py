@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,3 +38,29 @@ class Series:
     reading: float
     sigma: float = 1.0
     own_zero: bool = False
+
+
+class Counted:
+    """What counts of some series, and by how much, to be put back where a trial with less has failed.
+
+    Args:
+        series: as they are now.
+
+    Attributes:
+        trained: samples of each that fits saw, shape (n,) each.
+    """
+
+    def __init__(self, series: Sequence[Series]) -> None:
+        self._series = tuple(series)
+        self._kept = [(one.train, one.hold, one.sigma) for one in series]
+        self.trained = [one.train for one in series]
+
+    def put_back(self) -> None:
+        """Every series counts as it did."""
+        for one, (train, hold, sigma) in zip(self._series, self._kept, strict=True):
+            one.train, one.hold, one.sigma = train, hold, sigma
+
+    def weigh_as_before(self) -> None:
+        """What counts is divided by what it was divided by."""
+        for one, (_, _, sigma) in zip(self._series, self._kept, strict=True):
+            one.sigma = sigma

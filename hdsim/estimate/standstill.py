@@ -24,6 +24,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import FEWEST_SAMPLES, Array, Mask
+from hdsim.estimate.series import Counted
 from hdsim.estimate.state import State
 from hdsim.log.outliers import runs_of
 
@@ -74,7 +75,7 @@ def hear_standstill(
     sharp = [resolution(predictor.speed_noise) for predictor in bench.predictors]
     if signs == sharp:
         return found
-    masks = [(series.train, series.hold, series.sigma) for series in bench.series]
+    counted = Counted(bench.series)
 
     def take(smoothing: Sequence[float]) -> None:
         for predictor, speed in zip(bench.predictors, smoothing, strict=True):
@@ -100,8 +101,7 @@ def hear_standstill(
             if _likelier(bench, smooth.predictions, sharper.predictions):
                 return sharper
     take(signs)
-    for series, (train, hold, sigma) in zip(bench.series, masks, strict=True):
-        series.train, series.hold, series.sigma = train, hold, sigma
+    counted.put_back()
     return found
 
 

@@ -5,7 +5,7 @@ import pytest
 from noisy import noisy
 
 import hdsim
-from hdsim.estimate.beginning import EARLY, STRETCHES, beginnings, hear_beginning
+from hdsim.estimate.beginning import LATEST, STRETCHES, beginnings, hear_beginning
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit
@@ -50,10 +50,24 @@ def test_a_vibration_at_the_beginning_bends_no_number(begins_s):
     if begins_s == 0.0:
         [said] = beginnings(bench)
         assert said.kind == "beginning"
-        assert 0.2 < bench.begins_s[0] <= 15.0 * EARLY / STRETCHES
+        assert 0.2 < bench.begins_s[0] <= 15.0 * LATEST / STRETCHES
 
 
-def test_by_chance_one_beginning_in_ninety_one_is_left_out():
+@pytest.mark.slow
+def test_a_vibration_that_takes_a_fifth_of_a_short_record_bends_no_damping():
+    """While the drive rests at its reversals the motor's torque leaves more than the vibration does."""
+    given = SCENARIO.model_dump(mode="json", exclude_unset=True)
+    given["load"]["inertia_kg_m2"], given["run"] = 0.075, {"duration_s": 5.0, "sample_rate_hz": 1000.0}
+    scenario = Scenario.model_validate(given)
+    noise = {"motor_angle": 2e-5, "motor_torque": 5e-4, "output_angle": 2e-6}
+    bench = bench_for([noisy(hdsim.simulate(scenario), noise, seed=1)], [], scenario, None)
+    found = {one.name: one for one in refit(bench, state_of(scenario)).intervals}
+    for name, tolerance in (("stiffness_k1", 0.01), ("damping", 0.2)):
+        own = found[f"drive.torsion.{name}_nm{'_s' * (name == 'damping')}_per_rad"]
+        assert own.value == pytest.approx(own.start, rel=tolerance)
+
+
+def test_by_chance_one_beginning_in_ninety_one_is_left_out_for_each_channel():
     bench = bench_for([measured(5.0)], [], SCENARIO, None)
     own = bench.predict(state_of(SCENARIO))
     rng, heard = np.random.default_rng(2), 0
@@ -63,4 +77,5 @@ def test_by_chance_one_beginning_in_ninety_one_is_left_out():
             series.measured = predicted + rng.standard_normal(len(predicted))
             series.train, series.hold = train, hold
         heard += hear_beginning(bench, own)
-    assert 0 <= heard <= 12  # of 400 with a chance of 1/91: more in one case of a thousand
+    # Of 400 with a chance of 2/91, two channels: beyond that in two cases of a thousand.
+    assert 1 <= heard <= 19

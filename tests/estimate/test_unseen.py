@@ -1,4 +1,4 @@
-"""A held-out motion that shows what no training record does: the verdict, which cannot know, says so."""
+"""A held-out motion that shows what no training data do: the verdict, which cannot know, says so."""
 
 from copy import deepcopy
 
@@ -38,3 +38,37 @@ def test_what_only_held_out_data_show_is_said(trained, held):
         assert (problem.record, problem.kind, problem.severity) == ("proof", "held out", "warning")
     else:
         assert not found
+
+
+def both_ways(turns_back_s):
+    """A record that turns one way, but for the last half second of 4.5 and what is asked for."""
+    plant = deepcopy(BASE)
+    back = {"type": "ramp", "velocity_deg_per_s": -30.0}
+    moves = [
+        {"type": "ramp", "velocity_deg_per_s": 30.0, "duration_s": turns_back_s},
+        back | {"duration_s": 4.5 - turns_back_s},
+    ]
+    plant["command"] = positioned({"type": "sequence", "moves": moves})
+    plant["run"]["duration_s"] = 4.5
+    return noisy(hdsim.simulate(Scenario.model_validate(plant)), NOISE, seed=1)
+
+
+@pytest.mark.parametrize("turns_back_s", [1.2, 2.2, 4.05])
+def test_fits_see_each_direction_in_which_the_motor_turns(turns_back_s):
+    """Stretches of half a second, the third, sixth and ninth of which are held out as a rule."""
+    bench = bench_for([both_ways(turns_back_s)], [], Scenario.model_validate(BASE))
+    series, speed = bench.series[0], bench.predictors[0].motor_velocity
+    for way in (speed > 5.0, speed < -5.0):
+        assert series.train[way].mean() > 0.25
+        assert series.hold.mean() == pytest.approx(1 / 3, abs=0.02)
+
+
+def test_a_stretch_that_shows_what_no_other_does_is_said():
+    base = Scenario.model_validate(BASE)
+    record_ = record({}, "learned")
+    held = bench_for([record_], [], base).series[1].hold
+    record_.channels["output_angle"] = record_.channels["output_angle"] + 1e-4 * held
+    bench = bench_for([record_], [], base)
+    [said] = unseen(bench, bench.predict(state_of(base), everything=True))
+    assert (said.channel, said.kind) == ("output_angle", "held out")
+    assert "stretch" in said.message
