@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from foreign import ANGLE, TIME, N, write_csv
 from viewing import apart, messages, turned
 
 import hdsim
@@ -19,11 +20,7 @@ from hdsim.log.naming import EPOCH_NS
 from hdsim.recording import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT.parent / "shared" / "data"
 MAPPINGS = ROOT / "scenarios" / "mappings"
-N = 400
-TIME = np.arange(N) * 1e-3
-ANGLE = 0.3 * np.sin(2 * np.pi * 3 * TIME)
 TORQUE = 12 * np.cos(2 * np.pi * 3 * TIME)
 JOINTS = ["base", "elbow"]
 
@@ -53,13 +50,6 @@ def check(recording: Recording, tolerance: float = 1e-12) -> None:
     np.testing.assert_allclose(recording["motor_torque"], -TORQUE / 100, atol=tolerance)
     np.testing.assert_allclose(recording["transmission_error"], 1e-4, atol=10 * tolerance)
     assert recording.unit("motor_torque") == "N m"
-
-
-def write_csv(path: Path, columns: dict[str, np.ndarray], separator: str = ",") -> Path:
-    rows = np.column_stack(list(columns.values()))
-    lines = [separator.join(columns), *(separator.join(map(repr, row)) for row in rows.tolist())]
-    path.write_text("\n".join(lines) + "\n")
-    return path
 
 
 @pytest.fixture
@@ -295,195 +285,3 @@ def test_the_command_writes_a_log_and_tells_what_is_missing(tmp_path, table_mapp
     check(hdsim.open_log(tmp_path / "o.mcap"))
     wrong = CliRunner().invoke(import_data, [str(tmp_path / "o.mcap"), "-o", str(tmp_path / "o.mcap")])
     assert "is the file to be read" in str(wrong.exception)
-
-
-BASE = "channels:\n  output_angle: {column: a, unit: rad}\ntime: {column: t, unit: s}\n"
-
-
-def simple(tmp_path: Path, time: np.ndarray, values: np.ndarray, mapping: str) -> Recording:
-    (tmp_path / "m.yaml").write_text(mapping)
-    return import_recording(write_csv(tmp_path / "a.csv", {"t": time, "a": values}), tmp_path / "m.yaml")
-
-
-def test_a_coarse_clock_is_spread_over_the_samples(tmp_path):
-    true = np.arange(100) * 0.002
-    found = simple(
-        tmp_path, np.floor(true / 0.016) * 0.016, true, BASE.replace("unit: s", "unit: s, quantised: true")
-    )
-    np.testing.assert_allclose(found.time, true, atol=1e-3)
-    assert (np.diff(found.time) > 0).all()
-
-
-def test_a_constant_rate_is_seen_through_a_coarse_clock_and_a_gap(tmp_path):
-    # Ticks of two and a half samples: stamps come three times and twice in turn.
-    true = np.arange(900) * 0.002
-    true[500:] += 0.0731
-    mapping = BASE.replace("unit: s", "unit: s, quantised: true")
-    found = simple(tmp_path, np.floor(true / 0.005) * 0.005, true, mapping)
-    for part in (slice(0, 500), slice(500, 900)):
-        # The rate to a part in ten thousand, the beginning to half a tick.
-        np.testing.assert_allclose(np.diff(found.time[part]), 0.002, rtol=1e-4)
-        np.testing.assert_allclose(found.time[part], true[part], atol=0.0025)
-
-
-def test_a_rate_that_changes_is_not_taken_for_a_constant_one(tmp_path):
-    true = np.cumsum(np.where(np.arange(600) < 300, 0.002, 0.003))
-    mapping = BASE.replace("unit: s", "unit: s, quantised: true")
-    found = simple(tmp_path, np.floor(true / 0.016) * 0.016, true, mapping)
-    np.testing.assert_allclose(found.time, true, atol=0.016)
-
-
-def test_a_counter_that_wraps_goes_on(tmp_path):
-    found = simple(
-        tmp_path,
-        np.arange(1000) * 5 % 256,
-        np.zeros(1000),
-        BASE.replace("unit: s", "unit: ms, wraps_at: 256"),
-    )
-    np.testing.assert_allclose(found.time, np.arange(1000) * 5e-3)
-
-
-def test_an_angle_that_wraps_goes_on_and_a_rate_stands_for_time(tmp_path):
-    turns = np.linspace(0, 40, 1000)
-    found = simple(
-        tmp_path,
-        turns,
-        turns % (2 * np.pi),
-        "channels:\n  output_angle: {column: a, unit: rad, unwrap: true}\ntime: {rate_hz: 250}\n",
-    )
-    np.testing.assert_allclose(found["output_angle"], turns, atol=1e-12)
-    np.testing.assert_allclose(found.time, np.arange(1000) / 250)
-
-
-def test_gaps_are_told_and_masks_become_nan(tmp_path):
-    rng = np.random.default_rng(0)
-    time = np.concatenate([np.arange(500), np.arange(700, 1000)]) * 1e-3
-    clean = np.sin(20 * time) + 1e-3 * rng.standard_normal(len(time))
-    dirty = clean.copy()
-    spikes = [50, 250, 600]
-    dirty[spikes] += 0.1
-    found = simple(
-        tmp_path,
-        time,
-        dirty,
-        BASE + "longest_gap_s: 0.01\nmasks:\n  - {type: interval, start_s: 0.1, end_s: 0.1995}\n"
-        "  - {type: outliers, channels: [output_angle]}\n",
-    )
-    gone = np.flatnonzero(np.isnan(found["output_angle"]))
-    assert set(range(100, 200)) | set(spikes) <= set(gone.tolist())
-    assert len(gone) < 115
-    np.testing.assert_allclose(json.loads(found.metadata["gaps"]), [[0.499, 0.7]])
-    assert any(e.message == "gap of 0.201 s" and e.time == 0.499 for e in found.events)
-
-
-def test_rows_are_selected_by_a_column(tmp_path):
-    write_csv(tmp_path / "a.csv", {"t": TIME, "a": ANGLE, "fault": (np.arange(N) < 100) * 3.0})
-    (tmp_path / "m.yaml").write_text(BASE + "select:\n  - {column: fault, at_most: 0}\n")
-    found = import_recording(tmp_path / "a.csv", tmp_path / "m.yaml")
-    np.testing.assert_array_equal(found["output_angle"], ANGLE[100:])
-    assert found.time[0] == 0
-    (tmp_path / "m.yaml").write_text(BASE + "select:\n  - {column: fault, at_least: 7}\n")
-    with pytest.raises(InputError, match="no row meets"):
-        import_recording(tmp_path / "a.csv", tmp_path / "m.yaml")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("column: a,", "column: angel,", "no column 'angel'"),
-        ("column: a, unit: rad", "column: a", "m.yaml:2: channels.output_angle.unit"),
-        ("unit: rad", "unit: N m", "m.yaml:2: channels.output_angle.unit"),
-        ("unit: rad", "unit: rad, side: input", "'motor', 'output'"),
-        ("unit: rad", "unit: rad, side: motor", "that needs the ratio"),
-        ("unit: rad", "unit: count", "needs counts_per_turn"),
-        ("unit: rad", "unit: rad, sign: 2", "sign"),
-        ("output_angle", "output_angel", "output_angle"),
-        ("column: a,", "topic: /a, field: b,", "names topic '/a'"),
-        ("unit: s}", "unit: s}\nratio: 0.5", "at least 1"),
-        ("column: t, unit: s", "stamp: log", "neither a column nor a rate_hz"),
-        ("column: t, unit: s", "column: t", "needs its unit"),
-        (
-            "unit: s}",
-            "unit: s}\nmasks: [{type: outliers, channels: [motor_angle]}]",
-            "mapped are: output_angle",
-        ),
-    ],
-)
-def test_a_wrong_mapping_is_told_with_its_place(tmp_path, old, new, expected):
-    with pytest.raises(InputError) as error:
-        simple(tmp_path, TIME, ANGLE, BASE.replace(old, new))
-    assert expected in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("", "it is empty"),
-        ("t,a\n", "it is empty"),
-        ("t,a\n0,1\n", "one sample is no recording"),
-        ("t,a\n0,1\n1,x\n", "a.csv:3: column 'a': found 'x', expected a number"),
-        ("t,a\n0,1\n1\n", "a.csv:3: the line has 1 cells"),
-        ("t,a\n0,1\n1,1\n1,2\n", "sample 3 at 1 s follows 1 s"),
-        ("t,a\n0,1\n,1\n", "sample 2 has no time"),
-        ("\x00\xff", "a.csv"),
-    ],
-)
-def test_a_wrong_file_is_told(tmp_path, text, expected):
-    (tmp_path / "m.yaml").write_text(BASE)
-    (tmp_path / "a.csv").write_bytes(text.encode("latin-1"))
-    with pytest.raises(InputError) as error:
-        import_recording(tmp_path / "a.csv", tmp_path / "m.yaml")
-    assert expected in str(error.value)
-
-
-def test_files_that_are_not_what_they_seem(tmp_path):
-    (tmp_path / "m.yaml").write_text(
-        BASE.replace("column: a", "topic: /a, field: b").replace("column: t, unit: s", "")
-    )
-    for name in ("a.mcap", "a.xyz", "bag.db3"):
-        (tmp_path / name).write_text("nonsense")
-        with pytest.raises(InputError, match=name.split(".")[0]):
-            import_recording(tmp_path / name, tmp_path / "m.yaml")
-    with pytest.raises(InputError, match="no such file"):
-        import_recording(tmp_path / "nowhere.csv", tmp_path / "m.yaml")
-    (tmp_path / "c.yaml").write_text(BASE)
-    (tmp_path / "p.parquet").write_text("nonsense")
-    with pytest.raises(InputError, match="cannot be read as Parquet"):
-        import_recording(tmp_path / "p.parquet", tmp_path / "c.yaml")
-
-
-def measured_file(*parts: str) -> Path:
-    path = DATA.joinpath(*parts)
-    if not path.exists():
-        pytest.skip(f"the measured data {path} are not here")
-    return path
-
-
-@pytest.mark.parametrize("joint", range(1, 8))
-def test_kinova_joints_agree_with_what_the_robot_says_itself(joint):
-    path = measured_file("kinova-gen3-7dof", "validation_data", "opti_traj_testing1.csv")
-    found = import_recording(path, MAPPINGS / f"kinova_joint_{joint}.yaml")
-    raw = np.genfromtxt(path, delimiter=",", names=True)
-    assert len(found.time) == 4741
-    np.testing.assert_allclose(np.diff(found.time), 1e-3, atol=1e-6)
-    np.testing.assert_array_equal(found["output_angle"], raw[f"Position{joint}"])
-    kept = np.isfinite(found["motor_torque"])
-    assert kept.mean() > 0.95
-    # The robot's own column of torque from current refers to the output.
-    np.testing.assert_allclose(
-        100 * found["motor_torque"][kept], raw[f"TorqueCur{joint}"][kept], rtol=2e-3, atol=5e-3
-    )
-    # The derivative of the position is the velocity, so time and units fit.
-    slope = np.gradient(found["output_angle"], found.time)
-    sound = np.isfinite(found["output_velocity"])
-    assert np.corrcoef(slope[sound], found["output_velocity"][sound])[0, 1] > 0.9
-
-
-def test_cycloidal_ramps_show_the_play_that_their_loops_show():
-    path = measured_file("cycloidal-backlash-hysteresis", "2024-07-11__15-47-12__torqueramp__base_runin1.csv")
-    found = import_recording(path, MAPPINGS / "cycloidal_small_ramps.yaml")
-    assert (np.diff(found.time) > 0).all()
-    output_angle, output_torque = found["motor_angle"] / 14, found["motor_torque"] * 14
-    assert np.abs(output_torque).max() < 6
-    # Peak to peak over the ramps to 4 N m: about 2.67 degrees for the actuator without preload.
-    assert np.rad2deg(np.ptp(output_angle)) == pytest.approx(2.67, rel=0.1)
