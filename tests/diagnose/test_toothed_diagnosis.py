@@ -10,7 +10,7 @@ from hdsim.diagnosis.workflow import diagnose
 from hdsim.scenario import Scenario
 
 NOISE = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3}
-SECONDS = 3.0
+SECONDS = 3.5
 
 
 def drive(mesh, **effects):
