@@ -157,18 +157,14 @@ def _diagnosed(
         readings = readings_of_means([*records, *held], **means)
         bench = bench_for(records, held, scenario, load, readings=readings, zeros=zeros)
     with step("refit", "re-fitting the parameters of the model"):
-        try:
-            base = refit(bench, start)
-            left = bench.beyond_noise(base.fit.predictions)
-            fewer = readings_of_means([*records, *held], **means, left=left)
-            if fewer > readings:
-                # What is missing is so much that slower readings show it as well.
-                readings = fewer
-                bench = bench_for(records, held, scenario, load, readings=readings, zeros=zeros)
-                base = refit(bench, start)
-        except PredictionError as error:
-            names = ", ".join(record.name for record in records)
-            raise InputError(f"{names}: the model cannot follow the measured motion: {error}") from None
+        base = _refitted(bench, start)
+        left = bench.beyond_noise(base.fit.predictions)
+        fewer = readings_of_means([*records, *held], **means, left=left)
+        if fewer > readings:
+            # What is missing is so much that slower readings show it as well.
+            readings = fewer
+            bench = bench_for(records, held, scenario, load, readings=readings, zeros=zeros)
+            base = _refitted(bench, start)
 
     running = contextlib.ExitStack()
 
@@ -184,7 +180,7 @@ def _diagnosed(
             if found is None:
                 # The first effects have shown samples that do not count.
                 during("refit", "re-fitting the parameters of the model")
-                base = refit(bench, start)
+                base = _refitted(bench, start)
             elif found.better is not None:
                 # The effect has only shown the base's own numbers a better minimum.
                 own = base_intervals(found.better, base.freedoms)
@@ -193,7 +189,7 @@ def _diagnosed(
                 # All that a model leaves: it bends the base, and hides what is smaller.
                 jumps += back
                 during("refit", "re-fitting the parameters of the model")
-                base = refit(bench, start)
+                base = _refitted(bench, start)
             else:
                 break
     # Its own numbers are those that effects have asked for, too.
@@ -299,6 +295,19 @@ def _diagnosed(
     return Diagnosis(
         verdict, evidence, checks, bench, base, found.stages, named, current, start, predictions, also
     )
+
+
+def _refitted(bench: Bench, start: State) -> Refit:
+    """The model with its own numbers fitted.
+
+    Raises:
+        InputError: it cannot follow the motion.
+    """
+    try:
+        return refit(bench, start)
+    except PredictionError as error:
+        names = ", ".join(p.record.name for p in bench.predictors[: bench.training])
+        raise InputError(f"{names}: the model cannot follow the measured motion: {error}") from None
 
 
 @dataclass

@@ -12,7 +12,7 @@ from hdsim.diagnosis import workflow
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.check import check_record
-from hdsim.estimate.predict import predictors
+from hdsim.estimate.predict import PredictionError, predictors
 from hdsim.estimate.records import Record, record_from
 from hdsim.estimate.refit import refit
 from hdsim.estimate.state import state_of
@@ -124,6 +124,21 @@ def test_force_goes_on_in_spite_of_an_error(tmp_path, monkeypatch):
         workflow.diagnose([record], model)
     with pytest.raises(InputError, match="went on with 1 channel"):
         workflow.diagnose([record], model, force=True)
+
+
+def test_a_re_fit_that_fails_once_all_begins_anew_is_told(tmp_path, monkeypatch):
+    fitted = []
+
+    def fails_at_last(bench, start):
+        if fitted:
+            raise PredictionError("it ran away")
+        fitted.append(refit(bench, start))
+        return fitted[0]
+
+    monkeypatch.setattr(workflow, "refit", fails_at_last)
+    monkeypatch.setattr(workflow, "search", lambda *_: None)
+    with pytest.raises(InputError, match="r: the model cannot follow the measured motion: it ran away"):
+        workflow.diagnose([scaled()], scenario(tmp_path))
 
 
 def test_a_motion_that_no_model_follows_is_told(tmp_path):
