@@ -26,8 +26,8 @@ from hdsim.estimate.standstill import at_rest
 
 #: Stretches of a record, and those of them that may be left out; fewest samples in one of them.
 STRETCHES, EARLY, SAMPLES = 100, 10, 4
-#: Stretches that what dies down may take, and what of the first one's power the last one then has at most: in
-#: as many again it has less than a tenth.
+#: Stretches that what dies down may take (chosen: fits keep most of a record), and what of the first one's
+#: power the last of the early ones then has at most: twice as far on it has less than a tenth.
 LATEST, DIES = 30, 0.3
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Part of a step within which a shaft stands still: a steady motion goes a whole one in each run of readings.
 WITHIN = 0.25
-#: Readings of a rest that may be as well ones of a motion.
+#: Equal readings that are no rest yet: as many as a motion may leave within one step by chance (chosen).
 FEW = 4
 #: Part of a run of equal readings that must lie so near its middle: of a steady motion half of it does.
 MOSTLY = 0.75
