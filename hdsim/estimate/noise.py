@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from hdsim.estimate.records import Array, Mask
+from hdsim.estimate.records import Array, Mask, Record
 
 #: Orders of differences; beyond 8 they weigh only the highest frequencies.
 ORDERS = (4, 6, 8)
@@ -105,6 +105,12 @@ def quantisation_step(values: Array) -> float:
         if step > 0.0:
             return step
     return 0.0
+
+
+def step_of(record: Record, channel: str) -> float:
+    """Step of a channel's sensor: that of its readings, however many a sample is the mean of."""
+    raw = record.as_read
+    return quantisation_step(raw.channels[channel][raw.trusted[channel]])
 
 
 def _step(steps: Array) -> float:

@@ -25,6 +25,7 @@ from hdsim.estimate.lead_in import LeadInDamper
 from hdsim.estimate.noise import (
     noise_of_means,
     quantisation_step,
+    step_of,
     step_of_means,
     usual_size,
     without_orders,
@@ -204,7 +205,7 @@ class Predictor:
         """Step of a channel's sensor, as it is felt in the record."""
         raw, values = self.record.as_read, self.record.filled(channel)
         good = raw.trusted[channel]
-        step = quantisation_step(raw.channels[channel][good])
+        step = step_of(self.record, channel)
         return step_of_means(raw.channels[channel], good, step, values, self.record.readings)
 
     def measured(self, channel: str) -> tuple[Array, Mask, float, float]:
@@ -219,7 +220,7 @@ class Predictor:
         """
         record, raw = self.record, self.record.as_read
         values, trusted = record.filled(channel), record.trusted[channel]
-        step = quantisation_step(raw.channels[channel][raw.trusted[channel]])
+        step = step_of(record, channel)
         angle = self._factor * raw.filled(self.plan.motion)
 
         def noises(read: Array, good: Mask, step: float, means: Array, whole: Mask) -> tuple[float, float]:

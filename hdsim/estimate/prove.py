@@ -19,7 +19,7 @@ from hdsim.log.mapping import MEASURED
 
 #: Draws of blocks for the intervals.
 DRAWS = 500
-#: Ratio of what held-out and training records leave above which they do not show the same (chosen).
+#: Ratio of what held-out and training data leave above which they do not show the same (chosen).
 APART = 3.0
 
 

@@ -57,8 +57,9 @@ class Counted:
 
     def put_back(self) -> None:
         """Every series counts as it did."""
-        for one, (train, hold, sigma) in zip(self._series, self._kept, strict=True):
-            one.train, one.hold, one.sigma = train, hold, sigma
+        self.weigh_as_before()
+        for one, (train, hold, _) in zip(self._series, self._kept, strict=True):
+            one.train, one.hold = train, hold
 
     def weigh_as_before(self) -> None:
         """What counts is divided by what it was divided by."""

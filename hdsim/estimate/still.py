@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdsim.estimate.noise import quantisation_step
+from hdsim.estimate.noise import step_of
 from hdsim.estimate.records import Array, Mask
 from hdsim.log.outliers import runs_of
 
@@ -31,9 +31,8 @@ def fresh(predictor: Predictor, channel: str) -> Mask:
     record = predictor.record
     if channel != "output_angle" or predictor.plan.motion != "motor_angle":
         return np.ones(len(record.time), dtype=bool)
-    raw = record.as_read
-    step = quantisation_step(raw.channels[channel][raw.trusted[channel]])
-    return once_at_rest(record.filled(channel), predictor.motor_angle / predictor.ratio, step)
+    course = predictor.motor_angle / predictor.ratio
+    return once_at_rest(record.filled(channel), course, step_of(record, channel))
 
 
 def once_at_rest(values: Array, course: Array, step: float) -> Mask:
