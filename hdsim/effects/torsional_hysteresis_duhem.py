@@ -14,11 +14,14 @@ from hdsim.parts import Builder, DriveSize, Effect, Signature, State
 
 @element
 def duhem(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
-    """Hysteresis torque on the twist. Parameters: A, alpha; own state: z, N m."""
+    """Hysteresis torque on the twist. Parameters: A, alpha, n, z_s; own state: z, N m."""
     stiffness = parameters[0]
-    decay = parameters[1]
+    exponent = parameters[2]
     speed = inputs[TWIST_RATE]
     z = inputs[own]
+    decay = parameters[1]
+    if exponent != 1.0:
+        decay *= abs(z / parameters[3]) ** (exponent - 1.0)
     magnitude = abs(speed)
     direction = -1.0 if speed < 0.0 else 1.0
     heat = decay * z * z / stiffness
@@ -26,24 +29,25 @@ def duhem(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, ja
     jacobian[TWIST_TORQUE * columns + own] -= 1.0
     outputs[own] += stiffness * speed - decay * magnitude * z
     jacobian[own * columns + TWIST_RATE] += stiffness - decay * direction * z
-    jacobian[own * columns + own] -= decay * magnitude
+    jacobian[own * columns + own] -= exponent * decay * magnitude
     outputs[DISSIPATED] += heat * magnitude
     jacobian[DISSIPATED * columns + TWIST_RATE] += heat * direction
-    jacobian[DISSIPATED * columns + own] += 2.0 * decay * z / stiffness * magnitude
+    jacobian[DISSIPATED * columns + own] += (exponent + 1.0) * decay * z / stiffness * magnitude
     outputs[STORED] += 0.5 * z * z / stiffness
 
 
 class TorsionalHysteresisDuhem(Effect):
-    """tau = z, z' = A w - alpha |w| z, w the rate of twist; |z| saturates at A/alpha.
+    """tau = z, z' = A w - alpha |w| |z/z_s|^(n - 1) z, w the rate of twist; |z| saturates at z_s = A/alpha.
 
-    Rate-independent: on a branch z approaches the saturation exponentially over the twist 1/alpha. It stores
-    z^2/(2 A), the rest, alpha |w| z^2 / A, is heat.
+    Rate-independent: on a branch z approaches the saturation over the twist 1/alpha, with n = 1
+    exponentially, with a larger n later and more suddenly (the exponent of Bouc and Wen). It stores
+    z^2/(2 A), the rest, alpha |w| |z/z_s|^(n - 1) z^2 / A, is heat.
     """
 
     title: ClassVar[str] = "torsional hysteresis (Duhem)"
     source: ClassVar[str] = (
-        "Dhaouadi, Ghorbel and Gandhi 2003, IEEE Trans. Industrial Electronics 50:1165; level as for "
-        "Maxwell slip"
+        "Dhaouadi, Ghorbel and Gandhi 2003, IEEE Trans. Industrial Electronics 50:1165; exponent: Wen 1976, "
+        "J. Engineering Mechanics Division ASCE 102:249, his gamma 0; level as for Maxwell slip"
     )
     signature: ClassVar[Signature] = Signature(
         lives_in=("torque", "time_since_reversal", "direction"),
@@ -63,6 +67,16 @@ class TorsionalHysteresisDuhem(Effect):
             (Shape("saturation_twist_mrad", (0.1, 0.4), least=0.02, most=0.6),),
         ),
     )
+    finer: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"saturation_torque_nm": 1.0}),),
+            (
+                Shape("saturation_twist_mrad", (0.1, 0.4), least=0.02, most=0.6),
+                Shape("exponent", (1.5, 3.0), least=1.0, most=10.0),
+            ),
+            label="that saturates more suddenly",
+        ),
+    )
 
     stiffness_nm_per_rad: float = Field(5000.0, gt=0)
     """Stiffness A at a reversal from rest, N m/rad."""
@@ -77,6 +91,10 @@ class TorsionalHysteresisDuhem(Effect):
         float | None, Plausible(0.02, 0.6, "within the wind-up of the first stiffness")
     ] = Field(None, gt=0)
     """Twist 1/alpha of a branch, mrad; where it is given, A is the saturation torque over it."""
+    exponent: Annotated[float, Plausible(1.0, 10.0, "beyond ten it is an ideal slider")] = Field(
+        1.0, ge=1, le=100
+    )
+    """Exponent n: how suddenly a branch saturates; 1: exponentially."""
 
     @classmethod
     def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:
@@ -98,4 +116,5 @@ class TorsionalHysteresisDuhem(Effect):
         state = State(
             "hysteresis_torque", "N m", 0.0, self.saturation_torque_nm, "torque of the Duhem hysteresis"
         )
-        build.element(duhem, [stiffness, decay], states=(state,))
+        numbers = [stiffness, decay, self.exponent, self.saturation_torque_nm]
+        build.element(duhem, numbers, states=(state,))

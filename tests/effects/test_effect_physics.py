@@ -241,6 +241,22 @@ def test_duhem_branch_is_the_exponential() -> None:
     assert np.allclose(by_twist.follow(k.TWIST, lambda t: 1e-3 * t, lambda t: 1e-3, times)[0], z, atol=1e-9)
 
 
+def test_duhem_of_exponent_two_loads_along_a_hyperbolic_tangent_and_unloads_along_a_tangent() -> None:
+    """The solutions of dz/dx = A (1 -+ (z/z_s)^2) on both sides of a reversal."""
+    model = Alone(TorsionalHysteresisDuhem(saturation_torque_nm=2, saturation_twist_mrad=0.5, exponent=2))
+    times = np.linspace(0, 1, 40)
+    up, down = times <= 0.5, times > 0.5
+    z = model.follow(
+        k.TWIST, lambda t: 1e-3 * min(t, 1 - t), lambda t: 1e-3 * (1 if t <= 0.5 else -1), times
+    )[0]
+    top = 2 * math.tanh(1.0)
+    assert np.allclose(z[up], 2 * np.tanh(times[up] / 0.5), atol=1e-4)
+    back = np.arctan(top / 2) - (times[down] - 0.5) / 0.5
+    # Below zero the torque rises again along the hyperbolic tangent.
+    expected = np.where(back > 0, 2 * np.tan(back), 2 * np.tanh(back))
+    assert np.allclose(z[down], expected, atol=1e-3)
+
+
 def test_backlash_widens_by_half_on_each_side() -> None:
     build = Collector()
     OutputBacklash(backlash_arcmin=3).contribute(build)

@@ -24,6 +24,7 @@ from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
 from hdsim.effects.position_dependent_friction import FrictionComponent, PositionDependentFriction
 from hdsim.effects.thermal_friction import ThermalFriction
 from hdsim.effects.thermal_stiffness import ThermalStiffness
+from hdsim.effects.torsional_hysteresis_duhem import TorsionalHysteresisDuhem
 from hdsim.effects.torsional_hysteresis_maxwell import SlipElement, TorsionalHysteresisMaxwell
 from hdsim.effects.unbalance import Unbalance
 from hdsim.effects.wave_generator_bearing import BearingComponent, WaveGeneratorBearing
@@ -74,6 +75,7 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {name: (kind(),) for name, kind in cata
             elements=(SlipElement(stiffness_nm_per_rad=4000, slip_torque_nm=0.7),), sharpness=3
         ),
     ),
+    "duhem, exponent": (TorsionalHysteresisDuhem(exponent=2.3),),
     "motor_torque_ripple, phases": (
         MotorTorqueRipple(components=(RippleComponent(order=7, cogging_nm=0.01, share=0.1, phase_deg=30),)),
         InputCoulombViscous(coulomb_nm=0.03),  # what the windings give without a load

@@ -53,6 +53,7 @@ UNITS = {
     "eccentricity_um": "µm",
     "extra_static_nm": "N m",
     "friction_nm": "N m",
+    "exponent": "",
     "gap_spread": "",
     "heat_capacity_j_per_k": "J/K",
     "growth": "",

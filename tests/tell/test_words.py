@@ -64,6 +64,7 @@ EXPECTED = {
     "thermal_friction.heat_capacity_j_per_k": "J/K",
     "thermal_friction.viscosity_coefficient_per_k": "1/K",
     "thermal_stiffness.stiffness_coefficient_per_k": "1/K",
+    "torsional_hysteresis_duhem.exponent": "",
     "torsional_hysteresis_duhem.saturation_torque_nm": "N m",
     "torsional_hysteresis_duhem.saturation_twist_mrad": "mrad",
     "torsional_hysteresis_maxwell.slip_torque_nm": "N m",
