@@ -11,17 +11,22 @@ from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
 from hdsim.kernel import DISSIPATED, STORED, TWIST_RATE, TWIST_TORQUE, element
 from hdsim.parts import Builder, DriveSize, Effect, Signature, State
 
+_TORQUE = Amplitude({"saturation_torque_nm": 1.0})
+#: Over less it would be a friction at the output, over more a spring.
+_TWIST = Shape("saturation_twist_mrad", (0.1, 0.4), least=0.02, most=0.6)
+
 
 @element
 def duhem(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
-    """Hysteresis torque on the twist. Parameters: A, alpha, n, z_s; own state: z, N m."""
+    """Hysteresis torque on the twist. Parameters: A, z_s, n; own state: z, N m."""
     stiffness = parameters[0]
+    saturation = parameters[1]
     exponent = parameters[2]
     speed = inputs[TWIST_RATE]
     z = inputs[own]
-    decay = parameters[1]
+    decay = stiffness / saturation
     if exponent != 1.0:
-        decay *= abs(z / parameters[3]) ** (exponent - 1.0)
+        decay *= abs(z / saturation) ** (exponent - 1.0)
     magnitude = abs(speed)
     direction = -1.0 if speed < 0.0 else 1.0
     heat = decay * z * z / stiffness
@@ -60,20 +65,11 @@ class TorsionalHysteresisDuhem(Effect):
             "input_coulomb_viscous": "absent with the wave generator locked",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting(
-            (Amplitude({"saturation_torque_nm": 1.0}),),
-            # Over less it would be a friction at the output, over more a spring.
-            (Shape("saturation_twist_mrad", (0.1, 0.4), least=0.02, most=0.6),),
-        ),
-    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((_TORQUE,), (_TWIST,)),)
     finer: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
-            (Amplitude({"saturation_torque_nm": 1.0}),),
-            (
-                Shape("saturation_twist_mrad", (0.1, 0.4), least=0.02, most=0.6),
-                Shape("exponent", (1.5, 3.0), least=1.0, most=10.0),
-            ),
+            (_TORQUE,),
+            (_TWIST, Shape("exponent", (1.5, 3.0), least=1.0, most=10.0)),
             label="that saturates more suddenly",
         ),
     )
@@ -112,9 +108,8 @@ class TorsionalHysteresisDuhem(Effect):
         stiffness = self.stiffness_nm_per_rad
         if self.saturation_twist_mrad is not None:
             stiffness = 1e3 * self.saturation_torque_nm / self.saturation_twist_mrad
-        decay = stiffness / self.saturation_torque_nm
         state = State(
             "hysteresis_torque", "N m", 0.0, self.saturation_torque_nm, "torque of the Duhem hysteresis"
         )
-        numbers = [stiffness, decay, self.exponent, self.saturation_torque_nm]
+        numbers = [stiffness, self.saturation_torque_nm, self.exponent]
         build.element(duhem, numbers, states=(state,))

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 import hdsim
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, at_present, fit
 from hdsim.estimate.records import Record
+from hdsim.estimate.refit import together
+from hdsim.estimate.state import Added
 from hdsim.scenario.model import Scenario
 
 RATE = 500.0
@@ -90,3 +95,15 @@ def rigid_record(
     torque = inertia * acceleration + coulomb * np.tanh(velocity / 0.5) + viscous * velocity
     torque = torque + extra(angle, velocity) + noise * rng.standard_normal(len(t))
     return Record("bench", t, {"motor_angle": angle, "motor_torque": torque})
+
+
+def with_effects(bench: Bench, found: Fit, *added: Added) -> Fit:
+    """A re-fitted model with effects, all its numbers fitted together."""
+    state = replace(found.state, added=added)
+    one = fit(bench, state, at_present(found), prune=False, after=found, evaluations=20, rough=True)
+    return together(bench, one, rough=True)
+
+
+def beyond(bench: Bench, found: Fit) -> float:
+    """Power of what a model leaves beyond the noise, over that of the noise."""
+    return bench.power(found.predictions) / bench.noise_power - 1.0

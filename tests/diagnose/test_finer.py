@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from diagnose_bench import servo_with_arm
+from diagnose_bench import beyond, servo_with_arm, with_effects
 from noisy import noisy
 
 import hdsim
@@ -15,7 +15,7 @@ from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.fit import Fit
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import Added, state_of
@@ -49,13 +49,7 @@ def with_play(
     added, *_ = starts(PLAY, plain, (), bench.ranges(found.state))
     added = replace(added, coefficients=(0.5 / added.settings()["backlash_arcmin"],))
     others = [starts(one, catalogue()[one].fittings[0], (), {})[0] for one in beside]
-    state = replace(found.state, added=(added, *others))
-    one = fit(bench, state, at_present(found), prune=False, after=found, evaluations=20, rough=True)
-    return bench, found, together(bench, one, rough=True)
-
-
-def beyond(bench: Bench, found: Fit) -> float:
-    return bench.power(found.predictions) / bench.noise_power - 1.0
+    return bench, found, with_effects(bench, found, added, *others)
 
 
 @pytest.mark.slow

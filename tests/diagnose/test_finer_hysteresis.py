@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from diagnose_bench import beyond, with_effects
 from moves import positioned
 from noisy import noisy
 
@@ -12,7 +13,7 @@ from hdsim.diagnosis.finer import refined
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.fit import Fit
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import state_of
@@ -48,14 +49,7 @@ def with_plain(truth: dict[str, float]) -> tuple[Bench, Fit, Fit]:
     bench = bench_for([record], [], base, "output_torque")
     found = refit(bench, state_of(base)).fit
     added, *_ = starts(DUHEM, catalogue()[DUHEM].fittings[0], (), bench.ranges(found.state))
-    added = replace(added, coefficients=(2.0,))
-    state = replace(found.state, added=(added,))
-    one = fit(bench, state, at_present(found), prune=False, after=found, evaluations=20, rough=True)
-    return bench, found, together(bench, one, rough=True)
-
-
-def beyond(bench: Bench, found: Fit) -> float:
-    return bench.power(found.predictions) / bench.noise_power - 1.0
+    return bench, found, with_effects(bench, found, replace(added, coefficients=(2.0,)))
 
 
 @pytest.mark.slow
