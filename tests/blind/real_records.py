@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from contract import AbsentError, Measured
+from scipy.optimize import least_squares
 from scipy.signal import savgol_filter, welch
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -25,6 +26,9 @@ KINOVA_FRICTION = {1: (2.66, 3.02), 3: (2.17, 2.40), 4: (2.44, 2.54), 6: (1.18, 
 KINOVA_ORDERS, LARA_ORDERS = (2.0, 7.0, 12.0, 14.0), (1.98, 2.0)
 #: N m at the output per ampere (SOURCE.md).
 KINOVA_CONSTANT = {1: 9.130, 3: 9.130, 4: 9.130, 6: 5.852, 7: 5.852}
+
+#: From here on the motor of the LARA8's joint comes to rest, and the arm rings on the drive, s.
+LARA_STOPS_S = 7.0
 
 #: Speed over which friction's sign is smoothed, rad/s of the motor (as the base's).
 SIGN_SPEED = 0.5
@@ -40,7 +44,7 @@ class Joint:
         sensors: in the words of a case's setup.
         base: the plain model as YAML: ratio, friction, stiffness and load, no effect.
         coulomb: friction at the motor, N m.
-        stiffness: of the drive at the output, N m/rad; 0: rigid.
+        stiffness: with which the drive yields to what is put in, at the output, N m/rad; 0: rigid.
         inertia: of the load, kg m^2; ``hanging`` the angle at which its arm hangs, ``weight`` that times its
             lever, N m.
         load: where the load's torque comes from.
@@ -143,17 +147,22 @@ def lara() -> Joint:
     motor = motor + ratio * np.mean(output - motor / ratio)
     torque = table["joint_torque_current_3"] / ratio
     record = Measured("joint 3", time, {"motor_angle": motor, "output_angle": output, "motor_torque": torque})
-    # Stiffness as in SOURCE.md, friction by its author's law there. Weight and inertia follow from the twist.
-    stiffness = 2.2e4
-    weight, hanging, inertia = _arm(record, ratio)
+    # Of the base the stiffness is as in SOURCE.md, which takes all of an error once a turn for wind-up under
+    # the weight; friction by its author's law there. The drive yields as its ringing at the end shows.
+    rotor, generator, stated = 2e-4, 5e-5, 2.2e4
+    weight, hanging, driven = _arm(record, ratio)
+    inertia = driven - ratio**2 * (rotor + generator)
+    ringing = record.time >= LARA_STOPS_S
+    frequency = rings_at(record.time[ringing], (output - motor / ratio)[ringing])
+    stiffness = inertia * (2 * np.pi * frequency) ** 2
     coulomb, viscous = (6.53 + 1.149) / ratio, 12 * 1.149 / ratio**2
     gravity = (
         f"  gravity: {{mass_kg: {weight / 9.80665 / 0.4:.6g}, centre_of_mass_m: 0.4, "
         f"hanging_angle_deg: {np.degrees(hanging):.6g}}}\n"
     )
     text = BASE.format(
-        name="LARA8 joint 3", rated=100, flexspline=200, circular=202, stiffness=stiffness, t1=20, t2=60,
-        damping=20.0, motor=2e-4, generator=5e-5, coulomb=coulomb, viscous=viscous, mesh="lumped",
+        name="LARA8 joint 3", rated=100, flexspline=200, circular=202, stiffness=stated, t1=20, t2=60,
+        damping=20.0, motor=rotor, generator=generator, coulomb=coulomb, viscous=viscous, mesh="lumped",
         inertia=inertia, gravity=gravity,
     )  # fmt: skip
     return Joint("lara 3", ratio, "both", text, coulomb, stiffness, inertia, None, (record,), hanging,
@@ -161,7 +170,9 @@ def lara() -> Joint:
 
 
 def _arm(record: Measured, ratio: float) -> tuple[float, float, float]:
-    """Weight times lever (N m), angle at which the arm hangs (rad), inertia (kg m^2), by the motor's torque.
+    """Weight times lever (N m), angle at which the arm hangs (rad), inertia that the motor drives (kg m^2).
+
+    By the motor's torque; the inertia is at the output, with the motor's own.
 
     Not from the twist: that holds the encoders' own errors once a turn, too.
     """
@@ -172,6 +183,23 @@ def _arm(record: Measured, ratio: float) -> tuple[float, float, float]:
     c, s, a = np.linalg.lstsq(columns, ratio * record.channels["motor_torque"], rcond=None)[0][:3]
     # The torque is w sin(q - h) + J q'' = w cos(h) sin(q) - w sin(h) cos(q) + J q'' and friction.
     return float(np.hypot(c, s)), float(np.arctan2(-c, s)), float(max(a, 0.5))
+
+
+def rings_at(time: np.ndarray, values: np.ndarray) -> float:
+    """Frequency of the damped oscillation about a parabola that leaves least of values, Hz."""
+    since = time - time[0]
+    parabola = np.vander(since, 3)
+
+    def left(asked: np.ndarray) -> np.ndarray:
+        turned = 2 * np.pi * asked[0] * since
+        swing = np.exp(-asked[1] * since)[:, None] * np.column_stack([np.cos(turned), np.sin(turned)])
+        return beyond(values, np.column_stack([parabola, swing]))
+
+    least, most = 2.0 / since[-1], 0.25 / float(np.median(np.diff(time)))
+    begins = np.arange(least, most, 0.5 / since[-1])
+    nearest = min(begins, key=lambda f: float(np.sum(left(np.array([f, 0.0])) ** 2)))
+    found = least_squares(left, [nearest, 0.0], bounds=([least, 0.0], [most, np.inf]), x_scale=[1.0, 1.0])
+    return float(found.x[0])
 
 
 def rates(time: np.ndarray, angle: np.ndarray, over_s: float = 0.15) -> tuple[np.ndarray, np.ndarray]:

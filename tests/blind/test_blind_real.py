@@ -6,7 +6,18 @@ import family_real as family
 import numpy as np
 import pytest
 from contract import Measured
-from real_records import DATA, KINOVA, LARA, Joint, lara, over_noise, rates, remains
+from real_records import (
+    DATA,
+    KINOVA,
+    LARA,
+    LARA_STOPS_S,
+    Joint,
+    lara,
+    over_noise,
+    rates,
+    remains,
+    rings_at,
+)
 from scipy.ndimage import gaussian_filter1d
 
 HERE = all((DATA / name).exists() for name in (KINOVA.format(1), KINOVA.format(2), LARA))
@@ -72,6 +83,33 @@ def test_rates_of_a_made_signal():
     inside = slice(200, -200)
     assert np.abs(speed - 2 * np.cos(2 * time))[inside].max() < 0.01
     assert np.abs(acceleration + 4 * np.sin(2 * time))[inside].max() < 0.02
+
+
+@pytest.mark.parametrize("frequency", [11.0, 14.0, 25.0])
+def test_a_joint_that_comes_to_rest_tells_the_frequency_at_which_it_rings(frequency):
+    rng = np.random.default_rng(5)
+    time = 7.0 + np.arange(0.0, 0.35, 0.004)
+    rung = 5e-5 * np.exp(-3.0 * time) / np.exp(-21.0) * np.sin(2 * np.pi * frequency * time + 1.0)
+    values = rung + 1e-4 * (7.35 - time) ** 2 - 2e-4 + rng.normal(0, 1e-5, len(time))
+    assert rings_at(time, values) == pytest.approx(frequency, rel=0.02)
+
+
+@recordings
+def test_what_is_put_into_the_joint_with_both_encoders_yields_as_its_own_twist_does():
+    """Two measures of J/K that share no sample: it rings at its stop; before, inertia twists it."""
+    made = lara()
+    record = made.records[0]
+    output, motor = record.channels["output_angle"], record.channels["motor_angle"]
+    rung = made.inertia / made.stiffness
+    assert 1 / (2 * np.pi * np.sqrt(rung)) == pytest.approx(14.0, rel=0.03)
+    _, acceleration = rates(record.time, output)
+    turning = [output, 2 * output, 3 * output, *(order * motor for order in made.orders)]
+    columns = [acceleration, np.ones_like(output), *(f(a) for a in turning for f in (np.sin, np.cos))]
+    before = record.time < LARA_STOPS_S
+    error = (output - motor / made.ratio)[before]
+    twisted = -np.linalg.lstsq(np.column_stack(columns)[before], error, rcond=None)[0][0]
+    # The smooth twist of a stroke tells it to a factor of two: 20 Hz, and not 7.
+    assert 0.45 * rung < twisted < 1.1 * rung
 
 
 def test_strength_is_the_ratio_of_root_mean_squares_in_white_noise_and_by_frequency_in_any_other():
