@@ -99,12 +99,12 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
             continue
-        if plain.fitting.label == fitting.label:
+        label = plain.fitting.label
+        if label == fitting.label or (fitting.refines and label not in fitting.refines):
             continue
         for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
-            coefficients: list[float] = []
-            for term, part in one.fitting.parts(()):
-                coefficients += [term.read(plain.settings())] * (part.stop - part.start)
+            settings = plain.settings()
+            coefficients = [c for term in one.fitting.terms for c in term.read(settings)]
             shapes = (own.get(x.path, start) for x, start in zip(fitting.shapes, one.shapes, strict=True))
             yield replace(one, coefficients=tuple(coefficients), shapes=tuple(shapes))
 

@@ -184,6 +184,7 @@ class Fitting:
         mesh: models that it is asked of, where not of all: those with teeth, or those without.
         lives_in: coordinates in which this way's residual is a function, the most telling first; those of the
             effect's signature where there are none.
+        refines: labels of the ways that it is a finer formula of, where not of all (``Effect.finer``).
         asks: numbers of the base, by their paths in a scenario, that its trace depends on and that no fit
             moves by itself (``Number.asked``): a fit of it moves them too.
     """
@@ -200,6 +201,7 @@ class Fitting:
     unless: tuple[str, ...] = ()
     mesh: Literal["", "toothed", "toothless"] = ""
     lives_in: tuple[str, ...] = ()
+    refines: tuple[str, ...] = ()
     asks: tuple[str, ...] = ()
 
     @property

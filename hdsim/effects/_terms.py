@@ -85,9 +85,9 @@ class Term:
         """
         raise NotImplementedError
 
-    def read(self, data: Settings) -> float:
-        """Coefficient at which its first field is as an effect's settings have it; 0 where they have none."""
-        return 0.0
+    def read(self, data: Settings) -> list[float]:
+        """Coefficients at which its fields are as an effect's settings have them; 0 where they have none."""
+        return [0.0] * self.count(())
 
     def at_end(self, c: Values, plausible: Limits) -> bool:
         """Whether a field is as strong as its range allows: what is fitted would rather be something else."""
@@ -165,13 +165,10 @@ class Amplitude(Term):
             before[path] = before.get(path, 0.0) + c[0] * unit
             put(data, path, before[path])
 
-    def read(self, data: Settings) -> float:
-        """See ``Term.read``."""
+    def read(self, data: Settings) -> list[float]:
+        """By the first field."""
         path, unit = next(iter(self.units.items()))
-        try:
-            return float(at(data, path)) / unit
-        except LookupError:
-            return 0.0
+        return [_number(data, path) / unit]
 
     def at_end(self, c: Values, plausible: Limits) -> bool:
         """At the upper end, or, of a signed one, at the lower."""
@@ -267,6 +264,11 @@ class Harmonic(Term):
         put(data, self.amplitude, self.unit * math.hypot(*c))
         put(data, self.phase, math.degrees(math.atan2(c[1], c[0])))
 
+    def read(self, data: Settings) -> list[float]:
+        """From amplitude and phase."""
+        size, angle = _number(data, self.amplitude) / self.unit, math.radians(_number(data, self.phase))
+        return [size * math.cos(angle), size * math.sin(angle)]
+
     def at_end(self, c: Values, plausible: Limits) -> bool:
         """A side of the square that ``bounds`` allows, or the amplitude's upper end; a phase has none."""
         widest = max(math.hypot(*c), math.sqrt(2.0) * max(abs(x) for x in c))
@@ -288,6 +290,14 @@ class Harmonic(Term):
         found[self.amplitude] = Ranged(*(self.unit * end for end in ends))
         angle, wide = math.degrees(math.atan2(c[1], c[0])), _seen_under(centre, covariance)
         found[self.phase] = Ranged(angle, angle - wide, angle + wide)
+
+
+def _number(data: Settings, path: str) -> float:
+    """A field of an effect's settings; 0 where they have none."""
+    try:
+        return float(at(data, path))
+    except LookupError:
+        return 0.0
 
 
 def _strongest(value: float, low: float, high: float) -> bool:

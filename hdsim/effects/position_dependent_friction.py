@@ -29,6 +29,22 @@ class FrictionComponent(Parameters):
     """What ``order`` counts: turns of the wave generator, of the output, or of the one against the other."""
 
 
+def _way(label: str, per: Turn, orders: tuple[int, ...], of: str | None = None) -> Fitting:
+    """Harmonics of a turn; a finer formula of the way with the label ``of``, if of any."""
+    lives_in, turns = ("output_angle", 50.0) if per == "output_turn" else ("wave_generator_angle", 1.0)
+    return Fitting(
+        tuple(
+            Harmonic(f"components.{k}.amplitude_nm", f"components.{k}.phase_deg", 0.002)
+            for k in range(len(orders))
+        ),
+        label=label,
+        turns=turns,
+        settings={"components": [{"order": order, "per": per} for order in orders]},
+        lives_in=(lives_in, "direction"),
+        refines=() if of is None else (of,),
+    )
+
+
 class PositionDependentFriction(Effect):
     """T = -sum A (1 + sin(order * angle + phase)) tanh(w_m/w_s) on the motor.
 
@@ -56,22 +72,15 @@ class PositionDependentFriction(Effect):
         },
     )
     several: ClassVar[bool] = True
-    fittings: ClassVar[tuple[Fitting, ...]] = tuple(
-        Fitting(
-            tuple(
-                Harmonic(f"components.{k}.amplitude_nm", f"components.{k}.phase_deg", 0.002)
-                for k in range(len(orders))
-            ),
-            label=label,
-            turns=turns,
-            settings={"components": [{"order": order, "per": per} for order in orders]},
-            lives_in=(lives_in, "direction"),
-        )
-        for label, per, orders, turns, lives_in in (
-            ("", "wave_generator_turn", (1, 2), 1.0, "wave_generator_angle"),
-            ("of the output", "output_turn", (1, 2, 3), 50.0, "output_angle"),
-        )
+    fittings: ClassVar[tuple[Fitting, ...]] = (
+        _way("", "wave_generator_turn", (1, 2)),
+        _way("of the output", "output_turn", (1, 2, 3)),
     )
+    finer: ClassVar[tuple[Fitting, ...]] = (
+        _way("tight over a part of the turn", "wave_generator_turn", (1, 2, 3, 4, 6), of=""),
+        _way("of the output, tight over a part of its turn", "output_turn", (1, 2, 3, 4, 5, 6),
+             of="of the output"),
+    )  # fmt: skip
 
     components: tuple[FrictionComponent, ...] = Field((FrictionComponent(order=2),), min_length=1)
     """The harmonics."""

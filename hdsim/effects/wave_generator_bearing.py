@@ -32,6 +32,20 @@ class BearingComponent(Parameters):
     """Phase of both at zero angle, degrees."""
 
 
+def _way(label: str, harmonics: tuple[int, ...]) -> Fitting:
+    """A larger ball's order and its multiples."""
+    return Fitting(
+        tuple(
+            Harmonic(f"components.{k}.friction_nm", f"components.{k}.phase_deg", 0.002)
+            for k in range(len(harmonics))
+        ),
+        shapes=(Shape("ball_to_pitch_diameter", (0.07, 0.0825, 0.095, 0.1075, 0.12), linear=True),),
+        settings={"components": [{"at": "larger_ball", "harmonic": k} for k in harmonics]},
+        label=label,
+        turns=20.0,
+    )
+
+
 class WaveGeneratorBearing(Effect):
     """T = -sum A (1 + sin u) tanh(w_m/w_s) on the motor and e = sum E sin u, u an order of the bearing.
 
@@ -58,14 +72,8 @@ class WaveGeneratorBearing(Effect):
             "motor_torque_ripple": "keeps its sign when the motion turns round, friction changes it",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting(
-            (Harmonic("components.0.friction_nm", "components.0.phase_deg", 0.002),),
-            shapes=(Shape("ball_to_pitch_diameter", (0.07, 0.0825, 0.095, 0.1075, 0.12), linear=True),),
-            settings={"components": [{"at": "larger_ball"}]},
-            turns=20.0,
-        ),
-    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (_way("", (1,)),)
+    finer: ClassVar[tuple[Fitting, ...]] = (_way("that is felt near the lobes", (1, 2, 3)),)
 
     balls: int = Field(23, ge=3)
     """Number of balls n."""

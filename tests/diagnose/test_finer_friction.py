@@ -1,0 +1,66 @@
+"""Friction over an angle that has its name, with multiples of its orders where the data tell them.
+
+Friction that is tight over a part of the turn is no sine of it. Of an exponential of a sine every multiple is
+known (Jacobi and Anger): exp(sin u) = I0(1) + 2 I1(1) sin u - 2 I2(1) cos 2u - 2 I3(1) sin 3u + ...
+"""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnose_bench import beyond, rigid_record, scenario, with_effects
+from scipy.special import iv
+
+from hdsim.diagnosis.finer import refined
+from hdsim.diagnosis.starts import starts
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.refit import refit, together
+from hdsim.estimate.state import state_of
+
+SIZE_NM = 0.006
+#: Effect, field of a component's amplitude, order of what is hidden, and places of its multiples.
+KINDS = {
+    "two lobes": ("position_dependent_friction", "amplitude_nm", 2.0, (1, 3, 4)),
+    "a larger ball": ("wave_generator_bearing", "friction_nm", 1.095, (0, 1, 2)),
+}
+
+
+def plainly_named(tmp_path: Any, kind: str, law: Any) -> tuple[Bench, Fit, Fit]:
+    """A rigid drive's log with friction of a law hidden, the base re-fitted, and with the plain effect."""
+    effect, _, order, _ = KINDS[kind]
+    record = rigid_record(
+        20.0,
+        noise=5e-4,
+        extra=lambda angle, velocity: SIZE_NM * law(order * angle + 0.4) * np.tanh(velocity / 0.5),
+    )
+    base = scenario(tmp_path)
+    bench = bench_for([record], [], base, None)
+    found = refit(bench, state_of(base)).fit
+    ways = starts(effect, catalogue()[effect].fittings[0], (), bench.ranges(found.state))
+    added = ways[len(ways) // 2]
+    return bench, found, with_effects(bench, found, added)
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_multiples_of_an_order_are_found_with_their_sizes_and_phases(tmp_path: Any, kind: str) -> None:
+    bench, base, plain = plainly_named(tmp_path, kind, lambda u: np.exp(np.sin(u)))
+    found = together(bench, refined(bench, base, plain, lambda _: None))
+    assert beyond(bench, plain) > 1.0
+    assert beyond(bench, found) < 0.05
+    _, field, _, places = KINDS[kind]
+    components = found.state.added[0].settings()["components"]
+    for multiple, place in enumerate(places, start=1):
+        one = components[place]
+        truth = SIZE_NM * 2.0 * iv(multiple, 1.0) * np.exp(1j * (multiple * 0.4 - (multiple - 1) * np.pi / 2))
+        told = one[field] * np.exp(1j * np.radians(one["phase_deg"]))
+        assert abs(told - truth) < 0.05 * SIZE_NM
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_a_sine_of_the_angle_stays_one(tmp_path: Any, kind: str) -> None:
+    bench, base, plain = plainly_named(tmp_path, kind, lambda u: 1.0 + np.sin(u))
+    assert beyond(bench, plain) < 0.05
+    assert refined(bench, base, plain, lambda _: None) is plain
