@@ -292,8 +292,12 @@ def test_whatever_a_fits_bounds_allow_is_a_legal_effect(name):
             catalogue()[name].model_validate(effect.settings())
 
 
-def test_an_amplitude_reads_back_what_it_has_written() -> None:
+def test_a_term_reads_back_what_it_has_written() -> None:
     term, data = Amplitude({"a_nm": 0.5, "inner.b": 2.0}), {"inner": {}}
     term.write(data, [3.0], (), {})
-    assert term.read(data) == 3.0
-    assert term.read({"inner": {"b": 6.0}}) == 0.0
+    assert term.read(data) == [3.0]
+    assert term.read({"inner": {"b": 6.0}}) == [0.0]
+    wave, turned = Harmonic("waves.0.a_nm", "waves.0.phase_deg", 0.5), {"waves": [{}]}
+    wave.write(turned, [3.0, -4.0], (), {})
+    assert wave.read(turned) == pytest.approx([3.0, -4.0])
+    assert wave.read({"waves": []}) == [0.0, 0.0]
