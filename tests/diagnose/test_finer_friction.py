@@ -4,6 +4,8 @@ Friction that is tight over a part of the turn is no sine of it. Of an exponenti
 known (Jacobi and Anger): exp(sin u) = I0(1) + 2 I1(1) sin u - 2 I2(1) cos 2u - 2 I3(1) sin 3u + ...
 """
 
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,10 @@ import pytest
 from diagnose_bench import beyond, rigid_record, scenario, with_effects
 from scipy.special import iv
 
-from hdsim.diagnosis.finer import refined
+from hdsim.diagnosis.finer import _begins, refined
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
+from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.opening import bench_for
@@ -57,6 +60,26 @@ def test_multiples_of_an_order_are_found_with_their_sizes_and_phases(tmp_path: A
         truth = SIZE_NM * 2.0 * iv(multiple, 1.0) * np.exp(1j * (multiple * 0.4 - (multiple - 1) * np.pi / 2))
         told = one[field] * np.exp(1j * np.radians(one["phase_deg"]))
         assert abs(told - truth) < 0.05 * SIZE_NM
+
+
+@pytest.mark.parametrize(
+    "plain",
+    catalogue()["position_dependent_friction"].fittings,
+    ids=lambda way: way.label or "of the wave generator",
+)
+def test_a_finer_formula_begins_as_the_plain_one_of_the_same_turn_is(plain: Fitting) -> None:
+    bench = SimpleNamespace(turns=100.0, ranges=lambda state: {})
+    current = SimpleNamespace(state=SimpleNamespace(toothed=False))
+    added, *_ = starts("position_dependent_friction", plain, (), {})
+    added = replace(added, coefficients=tuple(0.5 * k - 1.1 for k in range(len(added.coefficients))))
+    [begun] = _begins(bench, current, added)  # type: ignore[arg-type]
+    own, further = added.settings()["components"], begun.settings()["components"]
+    for one, other in zip(own, further, strict=False):
+        assert other["per"] == one["per"]
+        assert [other[k] for k in ("order", "amplitude_nm", "phase_deg")] == pytest.approx(
+            [one[k] for k in ("order", "amplitude_nm", "phase_deg")]
+        )
+    assert all(other["amplitude_nm"] == 0.0 for other in further[len(own) :])
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
