@@ -96,17 +96,21 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
     """
     finer: tuple[Fitting, ...] = catalogue()[plain.effect].finer
     own = dict(zip((shape.path for shape in plain.fitting.shapes), plain.shapes, strict=True))
+    label, settings = plain.fitting.label, plain.settings()
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
             continue
-        label = plain.fitting.label
         if label == fitting.label or (fitting.refines and label not in fitting.refines):
             continue
+        begun = set()
         for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
-            settings = plain.settings()
+            pairs = zip(fitting.shapes, one.shapes, strict=True)
+            shapes = tuple(own.get(shape.path, start) for shape, start in pairs)
+            if shapes in begun:
+                continue  # starts of a shape that the effect has already are one
+            begun.add(shapes)
             coefficients = [c for term in one.fitting.terms for c in term.read(settings)]
-            shapes = (own.get(x.path, start) for x, start in zip(fitting.shapes, one.shapes, strict=True))
-            yield replace(one, coefficients=tuple(coefficients), shapes=tuple(shapes))
+            yield replace(one, coefficients=tuple(coefficients), shapes=shapes)
 
 
 def _with_fewer(bench: Bench, found: Fit) -> list[Fit]:

@@ -241,6 +241,12 @@ class Harmonic(Term):
     phase: str
     unit: float
 
+    @classmethod
+    def components(cls, amplitude: str, unit: float, count: int) -> tuple[Self, ...]:
+        """One for each of the first items of an effect's ``components``, by their field of the amplitude."""
+        items = (f"components.{k}" for k in range(count))
+        return tuple(cls(f"{item}.{amplitude}", f"{item}.phase_deg", unit) for item in items)
+
     def paths(self) -> tuple[str, ...]:
         """Amplitude and phase."""
         return (self.amplitude, self.phase)

@@ -95,10 +95,7 @@ class KinematicError(Effect):
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (
-                *(
-                    Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.1)
-                    for k in range(3)
-                ),
+                *Harmonic.components("amplitude_arcmin", 0.1, 3),
                 Periodic(
                     "components",
                     "amplitude_arcmin",
@@ -119,10 +116,7 @@ class KinematicError(Effect):
             lives_in=("wave_generator_angle",),
         ),
         Fitting(
-            tuple(
-                Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.1)
-                for k in range(3)
-            ),
+            Harmonic.components("amplitude_arcmin", 0.1, 3),
             label="of the output",
             turns=50.0,
             settings={"components": [{"order": n, "per": "output_turn"} for n in (1, 2, 3)]},

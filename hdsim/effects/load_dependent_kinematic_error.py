@@ -108,10 +108,7 @@ class LoadDependentKinematicError(Effect):
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
-            tuple(
-                Harmonic(f"components.{k}.stiffness_nm_per_rad", f"components.{k}.phase_deg", 500.0)
-                for k in range(4)
-            ),
+            Harmonic.components("stiffness_nm_per_rad", 500.0, 4),
             turns=1.0,
             settings={
                 "components": [

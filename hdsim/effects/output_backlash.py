@@ -92,10 +92,7 @@ class OutputBacklash(Effect):
         Fitting(
             (
                 Amplitude({"backlash_arcmin": 0.1}, of_range="twist_arcmin", play=True),
-                *(
-                    Harmonic(f"components.{k}.amplitude_arcmin", f"components.{k}.phase_deg", 0.02)
-                    for k in range(len(orders))
-                ),
+                *Harmonic.components("amplitude_arcmin", 0.02, len(orders)),
             ),
             (
                 Shape("uptake_torque_nm", (0.03, 0.2), of_range="torque_nm", most=1.0),

@@ -29,19 +29,16 @@ class FrictionComponent(Parameters):
     """What ``order`` counts: turns of the wave generator, of the output, or of the one against the other."""
 
 
-def _way(label: str, per: Turn, orders: tuple[int, ...], of: str | None = None) -> Fitting:
-    """Harmonics of a turn; a finer formula of the way with the label ``of``, if of any."""
+def _way(label: str, per: Turn, orders: tuple[int, ...], refines: tuple[str, ...] = ()) -> Fitting:
+    """Harmonics of a turn."""
     lives_in, turns = ("output_angle", 50.0) if per == "output_turn" else ("wave_generator_angle", 1.0)
     return Fitting(
-        tuple(
-            Harmonic(f"components.{k}.amplitude_nm", f"components.{k}.phase_deg", 0.002)
-            for k in range(len(orders))
-        ),
+        Harmonic.components("amplitude_nm", 0.002, len(orders)),
         label=label,
         turns=turns,
         settings={"components": [{"order": order, "per": per} for order in orders]},
         lives_in=(lives_in, "direction"),
-        refines=() if of is None else (of,),
+        refines=refines,
     )
 
 
@@ -77,9 +74,9 @@ class PositionDependentFriction(Effect):
         _way("of the output", "output_turn", (1, 2, 3)),
     )
     finer: ClassVar[tuple[Fitting, ...]] = (
-        _way("tight over a part of the turn", "wave_generator_turn", (1, 2, 3, 4, 6), of=""),
+        _way("tight over a part of the turn", "wave_generator_turn", (1, 2, 3, 4, 6), ("",)),
         _way("of the output, tight over a part of its turn", "output_turn", (1, 2, 3, 4, 5, 6),
-             of="of the output"),
+             ("of the output",)),
     )  # fmt: skip
 
     components: tuple[FrictionComponent, ...] = Field((FrictionComponent(order=2),), min_length=1)

@@ -35,10 +35,7 @@ class BearingComponent(Parameters):
 def _way(label: str, harmonics: tuple[int, ...]) -> Fitting:
     """A larger ball's order and its multiples."""
     return Fitting(
-        tuple(
-            Harmonic(f"components.{k}.friction_nm", f"components.{k}.phase_deg", 0.002)
-            for k in range(len(harmonics))
-        ),
+        Harmonic.components("friction_nm", 0.002, len(harmonics)),
         shapes=(Shape("ball_to_pitch_diameter", (0.07, 0.0825, 0.095, 0.1075, 0.12), linear=True),),
         settings={"components": [{"at": "larger_ball", "harmonic": k} for k in harmonics]},
         label=label,

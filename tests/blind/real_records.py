@@ -198,7 +198,7 @@ def rings_at(time: np.ndarray, values: np.ndarray) -> float:
     least, most = 2.0 / since[-1], 0.25 / float(np.median(np.diff(time)))
     begins = np.arange(least, most, 0.5 / since[-1])
     nearest = min(begins, key=lambda f: float(np.sum(left(np.array([f, 0.0])) ** 2)))
-    found = least_squares(left, [nearest, 0.0], bounds=([least, 0.0], [most, np.inf]), x_scale=[1.0, 1.0])
+    found = least_squares(left, [nearest, 0.0], bounds=([least, 0.0], [most, np.inf]))
     return float(found.x[0])
 
 

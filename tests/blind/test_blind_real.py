@@ -15,6 +15,7 @@ from real_records import (
     lara,
     over_noise,
     rates,
+    reading,
     remains,
     rings_at,
 )
@@ -106,7 +107,7 @@ def test_what_is_put_into_the_joint_with_both_encoders_yields_as_its_own_twist_d
     turning = [output, 2 * output, 3 * output, *(order * motor for order in made.orders)]
     columns = [acceleration, np.ones_like(output), *(f(a) for a in turning for f in (np.sin, np.cos))]
     before = record.time < LARA_STOPS_S
-    error = (output - motor / made.ratio)[before]
+    error = reading(made, record, "output_angle")[before]
     twisted = -np.linalg.lstsq(np.column_stack(columns)[before], error, rcond=None)[0][0]
     # The smooth twist of a stroke tells it to a factor of two: 20 Hz, and not 7.
     assert 0.45 * rung < twisted < 1.1 * rung
