@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -82,7 +83,9 @@ def again(
         screening = screen(bench, rest.state, left, peaks, before=before, leave_out=done)
         named = None
         if screening.ranked and screening.chance <= LEVEL:
-            named = name_effect(bench, rest, screening, left, on_step=tell)
+            # In its place a name has to leave less than the model with it does.
+            known = math.inf if stuck else bench.power(current.predictions)
+            named = name_effect(bench, rest, screening, left, on_step=tell, known_power=known)
         alone = len(names) == 1
         if named is None or (not alone and gain(bench, base, rest, named.fit) < BEYOND_GAIN):
             by_itself = as_good(bench, current, k, rest)

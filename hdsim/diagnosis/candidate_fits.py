@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdsim.diagnosis.traces import designs
+from hdsim.diagnosis.designs import designs
 from hdsim.estimate.asked import asked_beside
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, at_present, fit, sharpened
@@ -96,15 +96,27 @@ def as_given(bench: Bench, found: Fit) -> Fit | None:
 
 def fits_from(bench: Bench, base: Fit, given: Point, added: Added) -> list[Fit]:
     """The model with an effect, from where a linear fit at a point says that it lies."""
-    (columns,) = designs(bench, given.state, given.predictions, [added])
+    columns, rest = _linear(bench, base, given, added)
+    return [] if columns is None else rough_fits(bench, base, given, added, columns, bench.sample_power(rest))
+
+
+def linear_loss(bench: Bench, base: Fit, there: Point, added: Added) -> float:
+    """Power of what a linear fit at a point leaves of the model with an effect."""
+    _, rest = _linear(bench, base, there, added)
+    return float(rest @ rest)
+
+
+def _linear(bench: Bench, base: Fit, there: Point, added: Added) -> tuple[Array | None, Array]:
+    """An effect's trace at a point, if it has one, and what a linear fit of it and the base leaves there."""
+    (columns,) = designs(bench, there.state, there.predictions, [added])
     if columns is None:
-        return []
+        return None, there.left
     # Delays stay where they are: nothing bounds them here.
-    moving = np.ones(given.columns.shape[1])
+    moving = np.ones(there.columns.shape[1])
     moving[: len(base.frees)] = [not free.step for free in base.frees]
-    both = np.hstack([given.columns * moving, columns])
-    found, *_ = np.linalg.lstsq(both, given.left, rcond=1e-6)
-    return rough_fits(bench, base, given, added, columns, bench.sample_power(given.left - both @ found))
+    both = np.hstack([there.columns * moving, columns])
+    found, *_ = np.linalg.lstsq(both, there.left, rcond=1e-6)
+    return columns, there.left - both @ found
 
 
 def rough_fits(

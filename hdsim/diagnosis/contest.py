@@ -16,15 +16,17 @@ from hdsim.diagnosis.candidate_fits import (
     fits_from,
     full_fits,
     given_point,
+    linear_loss,
     point_at,
     rough_fits,
     to_its_end,
 )
+from hdsim.diagnosis.designs import designs
 from hdsim.diagnosis.screen import Residual
-from hdsim.diagnosis.traces import Screened, designs
+from hdsim.diagnosis.traces import Screened
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, strain
+from hdsim.estimate.fit import Fit, at_present, strain
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import REACHED
@@ -36,6 +38,11 @@ LEFT_IN, FAR_LEFT_IN = 2.0, 3.0
 FAR_MOST = 3
 #: Part by which a law of compliance must leave more than the best of them to be fitted from there too.
 LAGS = 0.1
+#: Stiffness over the re-fitted one where candidates are asked, too: half an octave of the resonance and one.
+OTHER_RESONANCES = 0.25, 0.5, 2.0, 4.0
+#: Part of what the best leaves that a linear fit must leave there for a fit to begin there (calibration cases
+#: of a recorded joint: 0.16 to 0.65 where the spring lies there, from 0.97 on where it does not).
+THERE = 0.8
 
 #: Candidates that were fitted, by name, each with whether it was fitted to the end.
 Fitted = dict[str, tuple[Fit, bool]]
@@ -48,6 +55,7 @@ def contest(
     residual: Residual,
     on_step: Callable[[str], object] | None,
     fitted: Fitted | None = None,
+    known_power: float = math.inf,
 ) -> list[tuple[str, Fit, Array]]:
     """Fit every candidate roughly, and the best of them further; each with what it leaves by blocks.
 
@@ -62,6 +70,7 @@ def contest(
         on_step: told what is being fitted.
         fitted: candidates of an earlier contest over the same base, which need not be fitted again; those of
             this one are added.
+        known_power: what a model that is known leaves: nothing that is as far behind it is carried on.
     """
     tell = on_step or (lambda _: None)
     known = fitted if fitted is not None else {}
@@ -90,7 +99,7 @@ def contest(
     if not best:
         return []
     noise = bench.noise_power
-    least = min(loss for loss, _ in best.values())
+    least = min(known_power, *(loss for loss, _ in best.values()))
     given = given_point(bench, base) if least > REACHED * noise else None
     if given is not None:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
@@ -102,7 +111,10 @@ def contest(
                     for each in (one, *one.others):
                         keep(one.name, fits_from(bench, base, given, each.added))
     _after_the_best(bench, base, shortlist, best, keep, tell)
-    least = min(loss for loss, _ in best.values())
+    least = min(known_power, *(loss for loss, _ in best.values()))
+    if least > FAR_LEFT_IN * noise:
+        _at_other_resonances(bench, base, shortlist, THERE * least, keep, tell)
+    least = min(known_power, *(loss for loss, _ in best.values()))
     full = {name for name, (_, whole) in known.items() if whole}
     further = [name for name, (loss, _) in best.items() if loss <= LEFT_IN * least and name not in full]
     for name in further:
@@ -111,7 +123,8 @@ def contest(
     _look_alikes(bench, base, shortlist, {name: best[name] for name in further}, keep, tell)
     first = min(best, key=lambda name: best[name][0])
     if first in further:
-        keep(first, fits_at_next_minima(bench, base, best[first][1], LEFT_IN * best[first][0]))
+        enough = LEFT_IN * min(known_power, best[first][0])
+        keep(first, fits_at_next_minima(bench, base, best[first][1], enough))
     for name in best:
         known[name] = best[name][1], name in full or name in further
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
@@ -144,6 +157,36 @@ def _after_the_best(
             yield from fits_from(bench, base, there, replace(one.added, shapes=shapes))
 
     _from_where_it_led(bench, base, (name, leader), rivals, begun, keep, tell)
+
+
+def _at_other_resonances(
+    bench: Bench,
+    base: Fit,
+    shortlist: Sequence[Screened],
+    enough: float,
+    keep: Callable[[str, Iterable[Fit]], None],
+    tell: Callable[[str], object],
+) -> None:
+    """Fit candidates from springs that put the resonance elsewhere, where a linear fit leaves little there.
+
+    What drives a resonance shows in phase below it and in counterphase above: from a spring on the wrong side
+    of what is excited every step to the right one leaves more.
+    """
+    springs = np.array([free.compliance for free in at_present(base)])
+    if not springs.any():
+        return
+    for factor in OTHER_RESONANCES:
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            there = point_at(bench, base, math.log(factor) * springs)
+            for one in shortlist:
+                if one.added.fitting.in_series:
+                    continue
+                for each in (one, *one.others):
+                    if linear_loss(bench, base, there, each.added) > enough:
+                        continue
+                    tell(f"fitting {one.name} from {factor:g} times the stiffness")
+                    for begun in fits_from(bench, base, there, each.added):
+                        keep(one.name, [begun, *full_fits(bench, base, begun)])
 
 
 def _look_alikes(

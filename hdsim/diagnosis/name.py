@@ -5,6 +5,7 @@ The base's own numbers stay free in these fits; candidates are compared block of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -104,6 +105,7 @@ def name_effect(
     coordinate: str = "",
     on_step: Callable[[str], object] | None = None,
     fitted: Fitted | None = None,
+    known_power: float = math.inf,
 ) -> Named | None:
     """Fit the screen's best in the simulated model and keep the best of them.
 
@@ -116,6 +118,7 @@ def name_effect(
         on_step: told what is being fitted.
         fitted: the base with each effect that was fitted for another residual of it; those of this one are
             added.
+        known_power: what a model that is known leaves, which this one is to take the place of.
     """
     best = screening.ranked[0]
     known = catalogue()
@@ -134,7 +137,7 @@ def name_effect(
         # The re-fit may have taken any compliance in series for the drive's own.
         shortlist += [one for one in series if one not in shortlist]
     with bench.coarse():
-        results = contest(bench, base, shortlist, residual, on_step, fitted)
+        results = contest(bench, base, shortlist, residual, on_step, fitted, known_power)
     if not results:
         return None
     *results, (_, _, before) = against_priors(

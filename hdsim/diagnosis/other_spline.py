@@ -15,9 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from hdsim.diagnosis.designs import designs
 from hdsim.diagnosis.name import SAME
 from hdsim.diagnosis.starts import neighbours, starts
-from hdsim.diagnosis.traces import designs
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench

@@ -11,7 +11,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hdsim.diagnosis.designs import traces
 from hdsim.diagnosis.locate import Place
+from hdsim.diagnosis.remembered import changed_since, key_of, known
 from hdsim.diagnosis.screen import LEVEL, Residual, Share, chance_of
 from hdsim.diagnosis.starts import neighbours, starts
 from hdsim.effects import catalogue
@@ -28,8 +30,6 @@ MANY, TRACELESS = 6, 2e-3
 REFINED, REFINABLE = 2, 0.1
 #: Part of its best fitting's share that another kind of fitting must reach to be fitted too.
 KINDRED = 0.8
-#: Factor within which a trace's size must fit the residual's; else its unit is changed.
-FITTING = 4.0
 
 
 @dataclass
@@ -54,9 +54,10 @@ class Screening:
         ranked: by falling share, one entry an effect.
         chance: probability that the search finds the best share where nothing is missing.
         skipped: effects that could not be tried, with the reason.
-        seen: traces that were simulated, whitened with ``sigmas``, by what was asked for (``_key``): effect,
-            way of fitting with its units and settings, shapes. The units that were used may be others.
+        seen: traces that were simulated, whitened with ``sigmas``, by what was asked for (``key_of``):
+            effect, way of fitting with its units and settings, shapes. Units that were used may be others.
         sigmas: of every series when they were.
+        state: the model in which they were.
         behind: whether a way of fitting an effect acts behind the sensor whose reading is the load.
     """
 
@@ -65,6 +66,7 @@ class Screening:
     skipped: dict[str, str] = field(default_factory=dict)
     seen: dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array]] = field(default_factory=dict)
     sigmas: Array = field(default_factory=lambda: np.zeros(0))
+    state: State | None = None
     behind: dict[tuple[str, str], bool] = field(default_factory=dict)
 
 
@@ -88,11 +90,12 @@ def screen(
         lines: peaks of the order spectra.
         places: where the residual lives; fittings with many starts are left out where theirs shows nothing.
         before: an earlier screening of these data. What an effect does is nearly the same whatever other
-            effects the model has by now, so its traces serve again; those that come near are refined anew.
+            effects the model has by now, so its traces serve again, unless the model's own numbers have moved
+            so far that they are others; those that come near are refined anew.
         leave_out: effects that need not be tried, because one that the model has does what they do.
         on_step: told what is being tried.
     """
-    found = Screening(sigmas=np.array([series.sigma for series in bench.series]))
+    found = Screening(sigmas=np.array([series.sigma for series in bench.series]), state=state)
     found.behind = dict(before.behind) if before is not None else {}
     shares: list[Share] = []
     present = set(state.effects) | {added.effect for added in state.added}
@@ -142,14 +145,16 @@ def screen(
     wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
     with bench.coarse():
         without = bench.predict(state)
+        changed = changed_since(bench, before, state, without, found.sigmas)
 
     def look(several: Sequence[Added], *, first: bool = True) -> None:
-        known = _known(before, several, found.sigmas, bench) if first else {}
-        new = [added for added in several if _key(added) not in known]
+        asked = [added for added in several if added.effect not in changed] if first else []
+        remembered = known(before, asked, found.sigmas, bench)
+        new = [added for added in several if key_of(added) not in remembered]
         with bench.coarse():
             simulated = traces(bench, state, without, new, wanted)
-        keys = [*known, *(_key(added) for added in new)]
-        for key, (added, columns) in zip(keys, [*known.values(), *simulated], strict=True):
+        keys = [*remembered, *(key_of(added) for added in new)]
+        for key, (added, columns) in zip(keys, [*remembered.values(), *simulated], strict=True):
             if columns is None or not np.any(columns):
                 continue
             if first and not added.orders:
@@ -203,23 +208,6 @@ def _remarkable_first(found: Screening, shares: Sequence[Share]) -> None:
     found.chance = chances[0] if chances else 1.0
 
 
-def _key(added: Added) -> tuple[str, str, tuple[float, ...]]:
-    """All that an effect's trace depends on, as it is asked for: two ways of fitting may share a label."""
-    return added.effect, repr(added.fitting), added.shapes
-
-
-def _known(
-    before: Screening | None, wanted: Sequence[Added], sigmas: Array, bench: Bench
-) -> dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array | None]]:
-    """Traces of an earlier screening in these weights; without those whose orders are read from the data."""
-    if before is None:
-        return {}
-    factor = (before.sigmas / sigmas)[bench.stacked_series()][:, None]
-    keys = [_key(added) for added in wanted if not added.orders]
-    seen = {key: before.seen[key] for key in keys if key in before.seen}
-    return {key: (earlier, columns * factor) for key, (earlier, columns) in seen.items()}
-
-
 def ranked_anew(screening: Screening, residual: Residual) -> Screening:
     """A screening's traces on another residual of the same model."""
     found = Screening(skipped=screening.skipped)
@@ -265,66 +253,6 @@ def behind_sensor(
         motor = float(np.std(there.get("motor_torque", np.zeros(1)) - without.get("motor_torque", 0.0)))
         return torque > 0.5 * motor and torque > 0.0
     return False
-
-
-def traces(
-    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added], wanted: float
-) -> list[tuple[Added, Array | None]]:
-    """Change of the whitened predictions for each coefficient at 1 alone, shape (rows, k).
-
-    Args:
-        bench: the measured series.
-        state: the model without the effects.
-        predictions: its predictions.
-        tried: the effects; each is simulated apart.
-        wanted: root-mean-square that a trace should have; units that are far too small or large for this
-            drive are changed, and the trace is simulated again.
-
-    Returns:
-        Every effect in the units that were used, with its design, None where it could not be predicted.
-    """
-    found = list(zip(tried, designs(bench, state, predictions, tried), strict=True))
-    again: dict[int, Added] = {}
-    for k, (added, columns) in enumerate(found):
-        if columns is None or added.fitting.cumulative or added.fitting.play:
-            continue
-        size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
-        if size > 0 and not wanted / FITTING < size < wanted * FITTING:
-            factor = float(np.clip(wanted / size, 1e-3, 1e5))
-            again[k] = replace(added, fitting=added.fitting.rescaled(factor))
-    for (k, added), columns in zip(
-        again.items(), designs(bench, state, predictions, list(again.values())), strict=True
-    ):
-        if columns is not None:
-            found[k] = (added, columns)
-    return found
-
-
-def designs(
-    bench: Bench, state: State, predictions: Sequence[Array], tried: Sequence[Added]
-) -> list[Array | None]:
-    """The design of every effect in its own units, see ``traces``."""
-    states = []
-    for added in tried:
-        count = len(added.coefficients)
-        below = 1.0 if added.fitting.cumulative else 0.0
-        for k in range(count):
-            unit = tuple(1.0 if j == k else below if j < k else 0.0 for j in range(count))
-            states.append(replace(state, added=(*state.added, replace(added, coefficients=unit))))
-    there = iter(bench.predict_all(states))
-    found: list[Array | None] = []
-    for added in tried:
-        own = [next(there) for _ in added.coefficients]
-        columns: list[Array] = []
-        before: Sequence[Array] = predictions
-        for one in own:
-            if one is None:
-                break
-            columns.append(bench.trace(before, one))
-            if added.fitting.cumulative:
-                before = one
-        found.append(np.column_stack(columns) if len(columns) == len(own) else None)
-    return found
 
 
 def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:

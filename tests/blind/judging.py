@@ -140,11 +140,17 @@ def _components(effect: dict[str, Any]) -> list[dict[str, Any]]:
     return [one for one in found.values() if "order" in one]
 
 
-def _with_order(settings: Any) -> list[dict[str, Any]]:
-    """The sections of an effect's settings that have an order, however deep."""
+def _with_order(settings: Any, of: str = "") -> list[dict[str, Any]]:
+    """The sections of an effect's settings that have an order, however deep.
+
+    An eccentric encoder, the section ``of`` a channel, errs once in a turn of its shaft.
+    """
     if isinstance(settings, dict):
         own = [settings] if "order" in settings else []
-        return own + [one for part in settings.values() for one in _with_order(part)]
+        if "eccentricity_arcmin" in settings:
+            turn = "output_turn" if of == "output_angle" else "wave_generator_turn"
+            own.append({"order": 1.0, "per": turn})
+        return own + [one for name, part in settings.items() for one in _with_order(part, name)]
     return [one for part in settings for one in _with_order(part)] if isinstance(settings, list) else []
 
 

@@ -98,7 +98,7 @@ def test_a_case_follows_from_its_key(number):
     for one, other in zip((*first.records, *first.holdout), (*again.records, *again.holdout), strict=True):
         assert np.array_equal(one.time, other.time)
         assert all(np.array_equal(one.channels[c], other.channels[c]) for c in one.channels)
-    assert family.draw(number, 2).base != first.base
+    assert family.draw(number, 6).base != first.base
     assert first.family == "numpy"
     assert base_of(first).drive.mesh.model == "lumped"
     for record in (*first.records, *first.holdout):

@@ -269,3 +269,14 @@ def test_a_stand_in_with_what_was_put_in_needs_its_order(order, wanted):
 def test_a_field_that_two_hidden_effects_have_is_asked_of_neither():
     bristles, flexspline = {"coulomb_nm": 0.03, "stiffness_nm": 17.7}, {"stiffness_nm": 5e4, "form": 2.0}
     assert together(bristles, flexspline) == {"coulomb_nm": 0.03, "form": 2.0}
+
+
+@pytest.mark.parametrize(("channel", "wanted"), [("motor_angle", "right"), ("output_angle", "nothing")])
+def test_an_eccentric_encoder_errs_once_in_a_turn_of_its_shaft(channel, wanted):
+    one = real("effect", ("sensors", 0.0, 0.0), before=[OWN], order=1.0)
+    (said,) = one["verdict"]["effects"]
+    said |= {
+        "indistinguishable_from": ["kinematic_error"],
+        "settings": {channel: {"eccentricity_arcmin": 30.0}},
+    }
+    assert outcome(one) == wanted

@@ -13,9 +13,10 @@ import hdsim
 from hdsim.diagnosis import candidate_fits
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.contest import contest
+from hdsim.diagnosis.designs import traces
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.starts import starts
-from hdsim.diagnosis.traces import Screened, traces
+from hdsim.diagnosis.traces import Screened
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, added_spreads

@@ -9,11 +9,12 @@ import pytest
 import hdsim
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.contest import contest
+from hdsim.diagnosis.designs import designs, traces
 from hdsim.diagnosis.other_spline import of_other_spline
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.starts import neighbours, starts
 from hdsim.diagnosis.teeth import teeth_found
-from hdsim.diagnosis.traces import Screened, designs, screen, traces
+from hdsim.diagnosis.traces import Screened, screen
 from hdsim.diagnosis.verdict import IdentifiedEffect
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting

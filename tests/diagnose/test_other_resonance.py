@@ -1,0 +1,74 @@
+"""A base whose spring is far off has its resonance elsewhere; what drives it is named all the same."""
+
+from typing import Any
+
+import pytest
+from moves import NOISE, positioned
+from noisy import noisy
+
+import hdsim
+from hdsim.diagnosis.again import left_of
+from hdsim.diagnosis.name import name_effect
+from hdsim.diagnosis.traces import screen
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.orders import lines_of
+from hdsim.estimate.refit import refit
+from hdsim.estimate.state import state_of
+from hdsim.scenario import Scenario
+
+#: Stiffness K1 of the preset, N m/rad; with the load it rings at 14 Hz, and the motor makes up to 20 turns a
+#: second: a quarter of it rings at 7 Hz, which an error twice a turn crosses as well, at half the speed.
+K1 = 1.6e4
+STIFFNESS = ("stiffness_k1_nm_per_rad", "stiffness_k2_nm_per_rad", "stiffness_k3_nm_per_rad")
+AMPLITUDE_ARCMIN = 2.0
+
+
+def joint(effects: dict[str, Any]) -> Scenario:
+    moves = [
+        move
+        for distance_deg in (60, -90, 45)
+        for move in (
+            {
+                "type": "s_curve",
+                "distance_deg": distance_deg,
+                "maximum_velocity_deg_per_s": 70,
+                "maximum_acceleration_deg_per_s2": 60,
+                "maximum_jerk_deg_per_s3": 600,
+            },
+            {"type": "hold", "duration_s": 0.3},
+        )
+    ]
+    return Scenario.model_validate({
+        "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
+        "effects": effects,
+        "command": positioned({"type": "sequence", "moves": moves}, position_gain_per_s=10.0),
+        "load": {"inertia_kg_m2": 2.0},
+        "run": {"duration_s": 7.0, "sample_rate_hz": 250.0},
+    })  # fmt: skip
+
+
+def opened(times: float) -> tuple[Bench, Fit]:
+    """A record with an error twice a turn, and the re-fit of a base with a part of the drive's stiffness."""
+    component = {"order": 2, "amplitude_arcmin": AMPLITUDE_ARCMIN, "phase_deg": 30}
+    run = hdsim.simulate(joint({"kinematic_error": {"components": [component]}}))
+    base = joint({})
+    torsion = {name: times * getattr(base.drive.torsion, name) for name in STIFFNESS}
+    torsion = base.drive.torsion.model_copy(update=torsion)
+    base = base.model_copy(update={"drive": base.drive.model_copy(update={"torsion": torsion})})
+    bench = bench_for([noisy(run, NOISE, seed=1)], [], base, None)
+    return bench, refit(bench, state_of(base)).fit
+
+
+@pytest.mark.slow
+def test_an_error_that_crosses_the_resonance_is_named_from_a_quarter_of_the_stiffness() -> None:
+    """Otherwise it is a damaged tooth, 30 degrees wide, beside 0.57 of the stiffness."""
+    bench, base = opened(0.25)
+    left = left_of(bench, base)
+    lines = lines_of(bench, bench.residuals(base.predictions, drift=True), base.state.delays)
+    named = name_effect(bench, base, screen(bench, base.state, left, lines), left)
+    assert named is not None
+    assert named.name == "kinematic_error"
+    numbers = {free.name: free.at(t) for free, t in zip(named.fit.frees, named.fit.theta, strict=True)}
+    assert numbers["drive.torsion.stiffness_k1_nm_per_rad"] == pytest.approx(K1, rel=0.1)
