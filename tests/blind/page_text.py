@@ -99,8 +99,8 @@ of the reducible residual (seen as a rate of the test cases, its cause in a cali
 still has the source's stiffness, a third of what the joint shows, and so another resonance. The version
 before could not get a fit across it, and named a kinematic error of a strength from 3.5 on first in 5 of 17
 cases. These rates were seen; the cause was found and removed on calibration cases of the same joint, and all
-59 cases were run again: 16 of 17. (One of the other cases counts as right since an eccentric encoder counts as
-what it is, an error once in a turn of its shaft.)
+59 cases were run again: 16 of 17. (One of the other cases counts as right since an eccentric encoder counts
+as what it is, an error once in a turn of its shaft.)
 
 The cases of this page are kept in `tests/blind/results.jsonl.gz`, with their evidence: `python tests/blind
 page` generates the page from them, and `decide` can judge every one again.
