@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from moves import NOISE, positioned
 from noisy import noisy
@@ -9,9 +10,12 @@ from noisy import noisy
 import hdsim
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.name import name_effect
-from hdsim.diagnosis.traces import screen
+from hdsim.diagnosis.remembered import changed_since
+from hdsim.diagnosis.screen import Residual
+from hdsim.diagnosis.traces import Screening, screen
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit
+from hdsim.estimate.fit import Fit, at_present
+from hdsim.estimate.numbers import scaled
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import refit
@@ -61,14 +65,42 @@ def opened(times: float) -> tuple[Bench, Fit]:
     return bench, refit(bench, state_of(base)).fit
 
 
-@pytest.mark.slow
-def test_an_error_that_crosses_the_resonance_is_named_from_a_quarter_of_the_stiffness() -> None:
-    """Otherwise it is a damaged tooth, 30 degrees wide, beside 0.57 of the stiffness."""
+Quarter = tuple[Bench, Fit, Residual, Screening]
+
+
+@pytest.fixture(scope="module")
+def quarter() -> Quarter:
+    """From a quarter of the stiffness: record, re-fit, what that leaves, and the catalogue on the screen."""
     bench, base = opened(0.25)
     left = left_of(bench, base)
     lines = lines_of(bench, bench.residuals(base.predictions, drift=True), base.state.delays)
-    named = name_effect(bench, base, screen(bench, base.state, left, lines), left)
+    return bench, base, left, screen(bench, base.state, left, lines)
+
+
+@pytest.mark.slow
+def test_an_error_that_crosses_the_resonance_is_named_from_a_quarter_of_the_stiffness(
+    quarter: Quarter,
+) -> None:
+    """Otherwise it is a damaged tooth, 30 degrees wide, beside 0.57 of the stiffness."""
+    bench, base, left, screening = quarter
+    named = name_effect(bench, base, screening, left)
     assert named is not None
     assert named.name == "kinematic_error"
     numbers = {free.name: free.at(t) for free, t in zip(named.fit.frees, named.fit.theta, strict=True)}
     assert numbers["drive.torsion.stiffness_k1_nm_per_rad"] == pytest.approx(K1, rel=0.1)
+
+
+@pytest.mark.slow
+def test_only_traces_that_the_spring_changes_are_made_anew(quarter: Quarter) -> None:
+    bench, base, _, screening = quarter
+    springs = [free for free in at_present(base) if free.compliance]
+    stiff = scaled(base.state, springs, [np.log(3.0)] * len(springs))
+    with bench.coarse():
+        changed, same = (
+            changed_since(bench, screening, state, bench.predict(state), screening.sigmas)
+            for state in (stiff, base.state)
+        )
+    assert same == set()
+    assert {"wave_generator_eccentricity", "damaged_tooth"} <= changed
+    # What the motor alone feels, whose motion is measured, is the same with any spring.
+    assert not {"stribeck_friction", "motor_torque_ripple", "thermal_friction"} & changed
