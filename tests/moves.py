@@ -1,5 +1,6 @@
 """Drives that a controller in cascade moves: to and fro with rests between the moves, and as a sine."""
 
+from collections.abc import Iterable
 from typing import Any
 
 #: Standard deviations of good sensors, SI units.
@@ -21,23 +22,29 @@ def positioned(trajectory: dict[str, Any], *, position_gain_per_s: float = 30.0)
     }}  # fmt: skip
 
 
-#: Between the moves the motor is held by its friction, and creeps to where it is to be.
-MOVES = {
-    "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
-    "command": positioned({"type": "sequence", "moves": [
-        move
-        for distance_deg in (60, -90, 45, -15)
-        for move in (
+def to_and_fro(
+    distances_deg: Iterable[float], velocity_deg_per_s: float, acceleration: float, jerk: float
+) -> dict[str, Any]:
+    """A trajectory of moves with rests of 0.3 s after them; acceleration and jerk in degrees and seconds."""
+    moves: list[dict[str, Any]] = []
+    for distance_deg in distances_deg:
+        moves += [
             {
                 "type": "s_curve",
                 "distance_deg": distance_deg,
-                "maximum_velocity_deg_per_s": 90,
-                "maximum_acceleration_deg_per_s2": 500,
-                "maximum_jerk_deg_per_s3": 8000,
+                "maximum_velocity_deg_per_s": velocity_deg_per_s,
+                "maximum_acceleration_deg_per_s2": acceleration,
+                "maximum_jerk_deg_per_s3": jerk,
             },
             {"type": "hold", "duration_s": 0.3},
-        )
-    ]}),
+        ]
+    return {"type": "sequence", "moves": moves}
+
+
+#: Between the moves the motor is held by its friction, and creeps to where it is to be.
+MOVES = {
+    "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
+    "command": positioned(to_and_fro((60, -90, 45, -15), 90, 500, 8000)),
     "load": {"inertia_kg_m2": 0.5},
     "run": {"duration_s": 6.0, "sample_rate_hz": 1000.0},
 }  # fmt: skip

@@ -94,29 +94,28 @@ def as_given(bench: Bench, found: Fit) -> Fit | None:
     )  # fmt: skip
 
 
-def fits_from(bench: Bench, base: Fit, given: Point, added: Added) -> list[Fit]:
-    """The model with an effect, from where a linear fit at a point says that it lies."""
-    columns, rest = _linear(bench, base, given, added)
-    return [] if columns is None else rough_fits(bench, base, given, added, columns, bench.sample_power(rest))
+def fits_from(bench: Bench, base: Fit, there: Point, added: Added, enough: float = math.inf) -> list[Fit]:
+    """The model with an effect, from where a linear fit at a point says that it lies.
 
-
-def linear_loss(bench: Bench, base: Fit, there: Point, added: Added) -> float:
-    """Power of what a linear fit at a point leaves of the model with an effect."""
-    _, rest = _linear(bench, base, there, added)
-    return float(rest @ rest)
-
-
-def _linear(bench: Bench, base: Fit, there: Point, added: Added) -> tuple[Array | None, Array]:
-    """An effect's trace at a point, if it has one, and what a linear fit of it and the base leaves there."""
+    Args:
+        bench: the measured series.
+        base: the fitted model without the effect.
+        there: the point.
+        added: the effect.
+        enough: power of what the linear fit may leave for a fit to begin there.
+    """
     (columns,) = designs(bench, there.state, there.predictions, [added])
     if columns is None:
-        return None, there.left
+        return []
     # Delays stay where they are: nothing bounds them here.
     moving = np.ones(there.columns.shape[1])
     moving[: len(base.frees)] = [not free.step for free in base.frees]
     both = np.hstack([there.columns * moving, columns])
     found, *_ = np.linalg.lstsq(both, there.left, rcond=1e-6)
-    return columns, there.left - both @ found
+    rest = there.left - both @ found
+    if float(rest @ rest) > enough:
+        return []
+    return rough_fits(bench, base, there, added, columns, bench.sample_power(rest))
 
 
 def rough_fits(

@@ -16,7 +16,6 @@ from hdsim.diagnosis.candidate_fits import (
     fits_from,
     full_fits,
     given_point,
-    linear_loss,
     point_at,
     rough_fits,
     to_its_end,
@@ -84,6 +83,9 @@ def contest(
             if name not in best or loss < best[name][0]:
                 best[name] = loss, each
 
+    def least_left() -> float:
+        return min(known_power, *(loss for loss, _ in best.values()))
+
     left = bench.stacked(bench.residuals(base.predictions))
     here = Point(np.zeros(len(base.frees)), base.state, base.predictions, base.columns, left)
     for one in shortlist:
@@ -99,7 +101,7 @@ def contest(
     if not best:
         return []
     noise = bench.noise_power
-    least = min(known_power, *(loss for loss, _ in best.values()))
+    least = least_left()
     given = given_point(bench, base) if least > REACHED * noise else None
     if given is not None:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
@@ -111,10 +113,9 @@ def contest(
                     for each in (one, *one.others):
                         keep(one.name, fits_from(bench, base, given, each.added))
     _after_the_best(bench, base, shortlist, best, keep, tell)
-    least = min(known_power, *(loss for loss, _ in best.values()))
-    if least > FAR_LEFT_IN * noise:
+    if (least := least_left()) > FAR_LEFT_IN * noise:
         _at_other_resonances(bench, base, shortlist, THERE * least, keep, tell)
-    least = min(known_power, *(loss for loss, _ in best.values()))
+    least = least_left()
     full = {name for name, (_, whole) in known.items() if whole}
     further = [name for name, (loss, _) in best.items() if loss <= LEFT_IN * least and name not in full]
     for name in further:
@@ -156,7 +157,8 @@ def _after_the_best(
         for shapes in product(*(shape.starts for shape in one.added.fitting.shapes)):
             yield from fits_from(bench, base, there, replace(one.added, shapes=shapes))
 
-    _from_where_it_led(bench, base, (name, leader), rivals, begun, keep, tell)
+    led = leader.theta[: len(base.frees)]
+    _from_elsewhere(bench, base, led, f"where {name} led", rivals, begun, keep, tell)
 
 
 def _at_other_resonances(
@@ -175,18 +177,17 @@ def _at_other_resonances(
     springs = np.array([free.compliance for free in at_present(base)])
     if not springs.any():
         return
+    rivals = [one for one in shortlist if not one.added.fitting.in_series]
+
+    def ended(there: Point, one: Screened) -> Iterator[Fit]:
+        for each in (one, *one.others):
+            for begun in fits_from(bench, base, there, each.added, enough):
+                yield begun
+                yield from full_fits(bench, base, begun)
+
     for factor in OTHER_RESONANCES:
-        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            there = point_at(bench, base, math.log(factor) * springs)
-            for one in shortlist:
-                if one.added.fitting.in_series:
-                    continue
-                for each in (one, *one.others):
-                    if linear_loss(bench, base, there, each.added) > enough:
-                        continue
-                    tell(f"fitting {one.name} from {factor:g} times the stiffness")
-                    for begun in fits_from(bench, base, there, each.added):
-                        keep(one.name, [begun, *full_fits(bench, base, begun)])
+        where = f"{factor:g} times the stiffness"
+        _from_elsewhere(bench, base, math.log(factor) * springs, where, rivals, ended, keep, tell)
 
 
 def _look_alikes(
@@ -215,26 +216,27 @@ def _look_alikes(
         nearest = min(begun, key=lambda each: bench.power(each.predictions), default=None)
         return to_its_end(bench, base, nearest, LEFT_IN * loss) if nearest is not None else []
 
-    _from_where_it_led(bench, base, (name, leader), rivals, ended, keep, tell)
+    led = leader.theta[: len(base.frees)]
+    _from_elsewhere(bench, base, led, f"where {name} led", rivals, ended, keep, tell)
 
 
-def _from_where_it_led(
+def _from_elsewhere(
     bench: Bench,
     base: Fit,
-    best: tuple[str, Fit],
+    theta: Array,
+    where: str,
     rivals: Sequence[Screened],
     fits: Callable[[Point, Screened], Iterable[Fit]],
     keep: Callable[[str, Iterable[Fit]], None],
     tell: Callable[[str], object],
 ) -> None:
-    """Fit rivals of the best from the numbers to which it led the base."""
+    """Fit candidates from other numbers of the base, shape (f,)."""
     if not rivals:
         return
-    name, leader = best
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-        there = point_at(bench, base, leader.theta[: len(base.frees)])
+        there = point_at(bench, base, theta)
         for one in rivals:
-            tell(f"fitting {one.name} from where {name} led")
+            tell(f"fitting {one.name} from {where}")
             keep(one.name, fits(there, one))
 
 

@@ -21,43 +21,48 @@ if TYPE_CHECKING:
 MOVED, CHANGED = 0.1, 0.1
 
 
+#: Traces by all that they depend on, as it is asked for, each with the effect in the units that were used.
+Traces = dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array]]
+
+
 def key_of(added: Added) -> tuple[str, str, tuple[float, ...]]:
     """All that an effect's trace depends on, as it is asked for: two ways of fitting may share a label."""
     return added.effect, repr(added.fitting), added.shapes
 
 
-def known(
-    before: Screening | None, wanted: Sequence[Added], sigmas: Array, bench: Bench
-) -> dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array | None]]:
-    """Traces of an earlier screening in these weights; without those whose orders are read from the data."""
-    if before is None:
-        return {}
-    factor = (before.sigmas / sigmas)[bench.stacked_series()][:, None]
-    keys = [key_of(added) for added in wanted if not added.orders]
-    seen = {key: before.seen[key] for key in keys if key in before.seen}
-    return {key: (earlier, columns * factor) for key, (earlier, columns) in seen.items()}
-
-
-def changed_since(
+def remembered(
     bench: Bench, before: Screening | None, state: State, without: Sequence[Array], sigmas: Array
-) -> set[str]:
-    """Effects whose traces of an earlier screening are those of another model: one of each is made anew.
+) -> Traces:
+    """Traces of an earlier screening in these weights, but of effects for which they are another model's.
 
     Where the drive's spring or its load's inertia have moved, the resonance is elsewhere, and what drives it
-    shows with another size and sign in another stretch of the record.
+    shows with another size and sign in another stretch of the record: one trace of each effect is made anew.
+
+    Args:
+        bench: the measured series.
+        before: the earlier screening, if there is one.
+        state: the model.
+        without: its predictions.
+        sigmas: of every series now.
     """
-    if before is None or before.state is None or not _moved(bench, before.state, state):
-        return set()
+    if before is None or before.state is None:
+        return {}
     factor = (before.sigmas / sigmas)[bench.stacked_series()][:, None]
-    one_of = {added.effect: (added, columns * factor) for added, columns in reversed(before.seen.values())}
+    seen = {key: (added, columns * factor) for key, (added, columns) in before.seen.items()}
+    if not _moved(bench, before.state, state):
+        return seen
     present = {added.effect for added in state.added}
-    asked = [(added, columns) for name, (added, columns) in one_of.items() if name not in present]
-    there = designs(bench, state, without, [added for added, _ in asked])
-    return {
-        added.effect
-        for (added, columns), anew in zip(asked, there, strict=True)
+    first: dict[str, tuple[Added, Array]] = {}
+    for added, columns in seen.values():
+        if added.effect not in present:
+            first.setdefault(added.effect, (added, columns))
+    there = designs(bench, state, without, [added for added, _ in first.values()])
+    changed = {
+        name
+        for (name, (_, columns)), anew in zip(first.items(), there, strict=True)
         if anew is None or _unlike(columns, anew) > CHANGED
     }
+    return {key: trace for key, trace in seen.items() if trace[0].effect not in changed}
 
 
 def _moved(bench: Bench, before: State, now: State) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from hdsim.diagnosis.designs import traces
 from hdsim.diagnosis.locate import Place
-from hdsim.diagnosis.remembered import changed_since, key_of, known
+from hdsim.diagnosis.remembered import Traces, key_of, remembered
 from hdsim.diagnosis.screen import LEVEL, Residual, Share, chance_of
 from hdsim.diagnosis.starts import neighbours, starts
 from hdsim.effects import catalogue
@@ -64,7 +64,7 @@ class Screening:
     ranked: list[Screened] = field(default_factory=list)
     chance: float = 1.0
     skipped: dict[str, str] = field(default_factory=dict)
-    seen: dict[tuple[str, str, tuple[float, ...]], tuple[Added, Array]] = field(default_factory=dict)
+    seen: Traces = field(default_factory=dict)
     sigmas: Array = field(default_factory=lambda: np.zeros(0))
     state: State | None = None
     behind: dict[tuple[str, str], bool] = field(default_factory=dict)
@@ -145,16 +145,17 @@ def screen(
     wanted = float(np.sqrt(residual.power / max(len(residual.values), 1)))
     with bench.coarse():
         without = bench.predict(state)
-        changed = changed_since(bench, before, state, without, found.sigmas)
+        memory = remembered(bench, before, state, without, found.sigmas)
 
     def look(several: Sequence[Added], *, first: bool = True) -> None:
-        asked = [added for added in several if added.effect not in changed] if first else []
-        remembered = known(before, asked, found.sigmas, bench)
-        new = [added for added in several if key_of(added) not in remembered]
+        # Orders are read from the data each time.
+        keys = [key_of(added) for added in several if not added.orders] if first else []
+        known = {key: memory[key] for key in keys if key in memory}
+        new = [added for added in several if key_of(added) not in known]
         with bench.coarse():
             simulated = traces(bench, state, without, new, wanted)
-        keys = [*remembered, *(key_of(added) for added in new)]
-        for key, (added, columns) in zip(keys, [*remembered.values(), *simulated], strict=True):
+        keys = [*known, *(key_of(added) for added in new)]
+        for key, (added, columns) in zip(keys, [*known.values(), *simulated], strict=True):
             if columns is None or not np.any(columns):
                 continue
             if first and not added.orders:

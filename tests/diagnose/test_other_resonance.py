@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from moves import NOISE, positioned
+from moves import NOISE, positioned, to_and_fro
 from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.name import name_effect
-from hdsim.diagnosis.remembered import changed_since
+from hdsim.diagnosis.remembered import remembered
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screening, screen
 from hdsim.estimate.bench import Bench
@@ -19,7 +19,7 @@ from hdsim.estimate.numbers import scaled
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import refit
-from hdsim.estimate.state import state_of
+from hdsim.estimate.state import State, state_of
 from hdsim.scenario import Scenario
 
 #: Stiffness K1 of the preset, N m/rad; with the load it rings at 14 Hz, and the motor makes up to 20 turns a
@@ -30,24 +30,10 @@ AMPLITUDE_ARCMIN = 2.0
 
 
 def joint(effects: dict[str, Any]) -> Scenario:
-    moves = [
-        move
-        for distance_deg in (60, -90, 45)
-        for move in (
-            {
-                "type": "s_curve",
-                "distance_deg": distance_deg,
-                "maximum_velocity_deg_per_s": 70,
-                "maximum_acceleration_deg_per_s2": 60,
-                "maximum_jerk_deg_per_s3": 600,
-            },
-            {"type": "hold", "duration_s": 0.3},
-        )
-    ]
     return Scenario.model_validate({
         "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
         "effects": effects,
-        "command": positioned({"type": "sequence", "moves": moves}, position_gain_per_s=10.0),
+        "command": positioned(to_and_fro((60, -90, 45), 70, 60, 600), position_gain_per_s=10.0),
         "load": {"inertia_kg_m2": 2.0},
         "run": {"duration_s": 7.0, "sample_rate_hz": 250.0},
     })  # fmt: skip
@@ -95,12 +81,16 @@ def test_only_traces_that_the_spring_changes_are_made_anew(quarter: Quarter) -> 
     bench, base, _, screening = quarter
     springs = [free for free in at_present(base) if free.compliance]
     stiff = scaled(base.state, springs, [np.log(3.0)] * len(springs))
-    with bench.coarse():
-        changed, same = (
-            changed_since(bench, screening, state, bench.predict(state), screening.sigmas)
-            for state in (stiff, base.state)
-        )
-    assert same == set()
+    asked = {added.effect for added, _ in screening.seen.values()}
+
+    def changed_in(state: State) -> set[str]:
+        with bench.coarse():
+            kept = remembered(bench, screening, state, bench.predict(state), screening.sigmas)
+        return asked - {added.effect for added, _ in kept.values()}
+
+    changed = changed_in(stiff)
+    assert changed_in(base.state) == set()
     assert {"wave_generator_eccentricity", "damaged_tooth"} <= changed
     # What the motor alone feels, whose motion is measured, is the same with any spring.
+    assert {"stribeck_friction", "thermal_friction", "load_dependent_loss"} <= asked
     assert not {"stribeck_friction", "motor_torque_ripple", "thermal_friction"} & changed
