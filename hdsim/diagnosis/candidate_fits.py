@@ -8,11 +8,13 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from hdsim.diagnosis.designs import designs
+from hdsim.diagnosis.point import Point, point_at
+from hdsim.diagnosis.softest import softest
 from hdsim.estimate.asked import asked_beside
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, at_present, fit, sharpened
@@ -31,67 +33,9 @@ FARTHEST = 2.0
 SOFTEST = 0.85
 #: Part of the screen's coefficient at which a compliance's fit, or one that led astray, begins a second time.
 SMALL = 0.2
-#: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
-FAR = 0.7
 #: Most times that a fit from another minimum is carried on, and part by which what it leaves must have fallen
 #: at a time: the way there is a bent valley.
 FARTHER, STALLED = 6, 0.01
-
-
-@dataclass
-class Point:
-    """Where the base is linear: its numbers and those of the effects that it has, and what it leaves there.
-
-    Attributes:
-        theta: logarithms of factors on the fitted base's numbers, shape (f,).
-        state: the base there.
-        predictions: its predictions.
-        columns: sensitivities to all numbers, shape (rows, p).
-        left: whitened residual, shape (rows,).
-    """
-
-    theta: Array
-    state: State
-    predictions: list[Array]
-    columns: Array
-    left: Array
-
-
-def point_at(bench: Bench, base: Fit, theta: Array) -> Point:
-    """The base at other numbers of its own, shape (f,)."""
-    frees = at_present(base)
-    state = scaled(base.state, frees, theta.tolist())
-    there = [free.moved(float(t)) for free, t in zip(frees, theta, strict=True)]
-    vector = Vector(state, tuple(there), 0)
-    predictions = bench.predict(state)
-    return Point(
-        theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
-        bench.stacked(bench.residuals(predictions)),
-    )  # fmt: skip
-
-
-def given_point(bench: Bench, found: Fit) -> Point | None:
-    """A fit's model with the base's numbers as given, whatever it began from; delays are no model's and stay.
-
-    None where none of them has gone far, or where nothing can be predicted.
-    """
-    theta = np.array([0.0 if free.step else free.none for free in at_present(found)])
-    if np.any(np.abs(theta) > FAR):
-        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            return point_at(bench, found, theta)
-    return None
-
-
-def as_given(bench: Bench, found: Fit) -> Fit | None:
-    """``given_point`` as a fit that has not begun."""
-    there = given_point(bench, found)
-    if there is None:
-        return None
-    frees = [free.moved(float(t)) for free, t in zip(at_present(found), there.theta, strict=True)]
-    return replace(
-        found, state=there.state, frees=frees, theta=np.zeros(len(frees)), predictions=there.predictions,
-        columns=there.columns,
-    )  # fmt: skip
 
 
 def fits_from(bench: Bench, base: Fit, there: Point, added: Added, enough: float = math.inf) -> list[Fit]:
@@ -153,6 +97,10 @@ def rough_fits(
         size = float(columns[:, 0] @ (point.columns @ np.expm1(-stiffer)) / (columns[:, 0] @ columns[:, 0]))
         if size > 0:
             begins.append((np.array([size]), stiffer))
+    if series and bench.power(point.predictions) > REACHED * bench.noise_power:
+        alone = softest(bench, point, added, columns, stiff)
+        if alone is not None:
+            begins.append((alone, np.zeros(len(moves))))
     if added.fitting.play:
         # By as much as the trace is too small, the spring beyond the play is stiffer.
         beyond = math.log(max(float(coefficients[0]), 1.0))

@@ -11,16 +11,14 @@ from itertools import product
 import numpy as np
 
 from hdsim.diagnosis.candidate_fits import (
-    Point,
     fits_at_next_minima,
     fits_from,
     full_fits,
-    given_point,
-    point_at,
     rough_fits,
     to_its_end,
 )
 from hdsim.diagnosis.designs import designs
+from hdsim.diagnosis.point import Point, given_point, point_at
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened
 from hdsim.effects import catalogue
@@ -105,13 +103,18 @@ def contest(
     given = given_point(bench, base) if least > REACHED * noise else None
     if given is not None:
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            nearest = sorted(best, key=lambda name: best[name][0])[:FAR_MOST]
-            nearest = [name for name in nearest if best[name][0] <= FAR_LEFT_IN * least]
+            near = [name for name in best if best[name][0] <= FAR_LEFT_IN * least]
+            nearest = sorted(near, key=lambda name: best[name][0])[:FAR_MOST]
             for one in shortlist:
-                if one.name in nearest:
+                series = one.added.fitting.in_series and one.name in near
+                if one.name in nearest or series:
                     tell(f"fitting {one.name} from the numbers as given")
-                    for each in (one, *one.others):
-                        keep(one.name, fits_from(bench, base, given, each.added))
+                    begun = _begun_at(bench, base, given, one)
+                    keep(one.name, begun)
+                    if series:
+                        # The bent base had what is its: on the way from there it leaves more at first.
+                        for nearest_one in _nearest_of_each(bench, begun):
+                            keep(one.name, full_fits(bench, base, nearest_one))
     _after_the_best(bench, base, shortlist, best, keep, tell)
     if (least := least_left()) > FAR_LEFT_IN * noise:
         _at_other_resonances(bench, base, shortlist, THERE * least, keep, tell)
@@ -121,7 +124,7 @@ def contest(
     for name in further:
         tell(f"fitting {name} in full")
         keep(name, full_fits(bench, base, best[name][1]))
-    _look_alikes(bench, base, shortlist, {name: best[name] for name in further}, keep, tell)
+    _look_alikes(bench, base, shortlist, best, further, keep, tell)
     first = min(best, key=lambda name: best[name][0])
     if first in further:
         enough = LEFT_IN * min(known_power, best[first][0])
@@ -194,30 +197,48 @@ def _look_alikes(
     bench: Bench,
     base: Fit,
     shortlist: Sequence[Screened],
-    full: dict[str, tuple[float, Fit]],
+    best: dict[str, tuple[float, Fit]],
+    full: Sequence[str],
     keep: Callable[[str, Iterable[Fit]], None],
     tell: Callable[[str], object],
 ) -> None:
-    """Fit look-alikes of the best anew from the numbers to which it led the base, where it misses the noise.
+    """Fit what looks like the best anew from the numbers to which it led the base.
 
-    What a re-fit bent to stand in for one of them is back there, and the way of each from the bent numbers is
-    a valley with turns: which is at its end first need not be the better one.
+    Of those that were fitted in full where the best misses the noise: what a re-fit bent to stand in for one
+    of them is back there, and the way of each from the bent numbers is a valley with turns: which is at its
+    end first need not be the better one. And laws of compliance that have not come as far: one as large as
+    the drive's own is found from few places.
     """
-    if len(full) < 2:
-        return
-    name = min(full, key=lambda name: full[name][0])
-    loss, leader = full[name]
-    if loss <= REACHED * bench.noise_power:
-        return
-    rivals = [one for one in shortlist if one.name in full and confusable(one.name, name)]
+    name = min(best, key=lambda name: best[name][0])
+    loss, leader = best[name]
+    noise = bench.noise_power
+    in_full = full if name in full and len(full) > 1 and loss > REACHED * noise else []
+    enough = (1.0 + LAGS) * max(loss, noise)
 
-    def ended(there: Point, one: Screened) -> list[Fit]:
-        begun = [found for each in (one, *one.others) for found in fits_from(bench, base, there, each.added)]
-        nearest = min(begun, key=lambda each: bench.power(each.predictions), default=None)
-        return to_its_end(bench, base, nearest, LEFT_IN * loss) if nearest is not None else []
+    def lags(one: Screened) -> bool:
+        return one.added.fitting.in_series and best.get(one.name, (math.inf,))[0] > enough
+
+    rivals = [one for one in shortlist if confusable(one.name, name) and (one.name in in_full or lags(one))]
+
+    def ended(there: Point, one: Screened) -> Iterator[Fit]:
+        for each in _nearest_of_each(bench, _begun_at(bench, base, there, one)):
+            yield from to_its_end(bench, base, each, LEFT_IN * loss)
 
     led = leader.theta[: len(base.frees)]
     _from_elsewhere(bench, base, led, f"where {name} led", rivals, ended, keep, tell)
+
+
+def _begun_at(bench: Bench, base: Fit, there: Point, one: Screened) -> list[Fit]:
+    """Fits of a candidate, in each of its formulas, begun at a point."""
+    return [found for each in (one, *one.others) for found in fits_from(bench, base, there, each.added)]
+
+
+def _nearest_of_each(bench: Bench, begun: Sequence[Fit]) -> Iterable[Fit]:
+    """Of each formula the fit that leaves least."""
+    nearest: dict[str, Fit] = {}
+    for each in sorted(begun, key=lambda each: bench.power(each.predictions)):
+        nearest.setdefault(each.state.added[-1].fitting.label, each)
+    return nearest.values()
 
 
 def _from_elsewhere(

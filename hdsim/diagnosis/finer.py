@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS
-from hdsim.diagnosis.candidate_fits import as_given
+from hdsim.diagnosis.point import as_given
 from hdsim.diagnosis.revise import EXCESS
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue

@@ -129,12 +129,12 @@ def name_effect(
 
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
     shortlist = [one for one in shortlist if _could_win(one, best)][:SHORTLIST]
-    softer = any(free.compliance and free.none > SOFTER for free in at_present(base))
+    softer = [free.none / free.prior for free in at_present(base) if free.compliance and free.none > SOFTER]
     series = [one for one in screening.ranked if one.added.fitting.in_series]
-    if softer and any(
-        one in series or any(confusable(one.name, other.name) for other in series) for one in shortlist
-    ):
-        # The re-fit may have taken any compliance in series for the drive's own.
+    kin = any(one in series or any(confusable(one.name, other.name) for other in series) for one in shortlist)
+    if softer and (kin or max(softer) > 1.0):
+        # The re-fit may have taken any compliance in series for the drive's own, and where that is softer
+        # than is likely, all of it.
         shortlist += [one for one in series if one not in shortlist]
     with bench.coarse():
         results = contest(bench, base, shortlist, residual, on_step, fitted, known_power)

@@ -15,12 +15,12 @@ from functools import partial
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
-from hdsim.diagnosis.candidate_fits import as_given
 from hdsim.diagnosis.contest import Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, Named, name_effect
+from hdsim.diagnosis.point import as_given
 from hdsim.diagnosis.rest import hear_rest
 from hdsim.diagnosis.revise import base_alone, revised
 from hdsim.diagnosis.screen import LEVEL, Residual

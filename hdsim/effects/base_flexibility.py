@@ -52,6 +52,7 @@ class BaseFlexibility(Effect):
         channels=("output_angle",),
         confused_with={
             "flexspline_stiffening": "not linear in torque",
+            "wave_generator_compliance": "not linear in torque: softest about zero torque",
             "stiffness_nonlinearity": "not linear in torque; a linear softening of all segments alike is "
             "the mount, or a drive that is softer than its catalogue value (which"
             " scatters by 30 %)",

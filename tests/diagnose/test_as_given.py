@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from diagnose_bench import rigid_record, scenario
 
-from hdsim.diagnosis.candidate_fits import as_given
+from hdsim.diagnosis.point import as_given
 from hdsim.estimate.fit import at_present
 from hdsim.estimate.numbers import scaled
 from hdsim.estimate.opening import bench_for

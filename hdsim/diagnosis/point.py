@@ -1,0 +1,75 @@
+"""Where the base is made linear: at its fitted numbers, at those that it was given with, or at any others."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, at_present
+from hdsim.estimate.numbers import scaled
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Array
+from hdsim.estimate.state import State
+from hdsim.estimate.vector import Vector, sensitivities
+
+#: Logarithm by which a re-fitted number may have moved before a fit begins at the given one too.
+FAR = 0.7
+
+
+@dataclass
+class Point:
+    """Where the base is linear: its numbers and those of the effects that it has, and what it leaves there.
+
+    Attributes:
+        theta: logarithms of factors on the fitted base's numbers, shape (f,).
+        state: the base there.
+        predictions: its predictions.
+        columns: sensitivities to all numbers, shape (rows, p).
+        left: whitened residual, shape (rows,).
+    """
+
+    theta: Array
+    state: State
+    predictions: list[Array]
+    columns: Array
+    left: Array
+
+
+def point_at(bench: Bench, base: Fit, theta: Array) -> Point:
+    """The base at other numbers of its own, shape (f,)."""
+    frees = at_present(base)
+    state = scaled(base.state, frees, theta.tolist())
+    there = [free.moved(float(t)) for free, t in zip(frees, theta, strict=True)]
+    vector = Vector(state, tuple(there), 0)
+    predictions = bench.predict(state)
+    return Point(
+        theta, state, predictions, sensitivities(bench, vector, vector.start(), predictions),
+        bench.stacked(bench.residuals(predictions)),
+    )  # fmt: skip
+
+
+def given_point(bench: Bench, found: Fit) -> Point | None:
+    """A fit's model with the base's numbers as given, whatever it began from; delays are no model's and stay.
+
+    None where none of them has gone far, or where nothing can be predicted.
+    """
+    theta = np.array([0.0 if free.step else free.none for free in at_present(found)])
+    if np.any(np.abs(theta) > FAR):
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            return point_at(bench, found, theta)
+    return None
+
+
+def as_given(bench: Bench, found: Fit) -> Fit | None:
+    """``given_point`` as a fit that has not begun."""
+    there = given_point(bench, found)
+    if there is None:
+        return None
+    frees = [free.moved(float(t)) for free, t in zip(at_present(found), there.theta, strict=True)]
+    return replace(
+        found, state=there.state, frees=frees, theta=np.zeros(len(frees)), predictions=there.predictions,
+        columns=there.columns,
+    )  # fmt: skip

@@ -1,0 +1,60 @@
+"""A mount as soft as the drive itself: no linear fit leads to it, and stiffening laws stand in for it."""
+
+from typing import Any
+
+import pytest
+from moves import NOISE, positioned, to_and_fro
+from noisy import noisy
+
+import hdsim
+from hdsim.diagnosis.again import left_of
+from hdsim.diagnosis.name import name_effect
+from hdsim.diagnosis.traces import screen
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.orders import lines_of
+from hdsim.estimate.refit import refit
+from hdsim.estimate.state import state_of
+from hdsim.scenario import Scenario
+
+#: Stiffness of the mount, half of the drive's K1, N m/rad.
+MOUNT = 8e3
+#: Weight of the arm, kg; its inertia, kg m^2; how it moves.
+HEAVY = 6.0, 1.5, to_and_fro((60, -90, 45), 70, 60, 600)
+LIGHT = 3.0, 0.6, to_and_fro((60, -90, 45), 90, 500, 8000)
+
+
+def arm(
+    mass_kg: float, inertia_kg_m2: float, trajectory: dict[str, Any], effects: dict[str, Any]
+) -> Scenario:
+    return Scenario.model_validate({
+        "drive": {"preset": "csg-20-100", "mesh": {"model": "lumped"}},
+        "effects": effects,
+        "command": positioned(trajectory),
+        "load": {"inertia_kg_m2": inertia_kg_m2, "gravity": {"mass_kg": mass_kg, "centre_of_mass_m": 0.3}},
+        "run": {"duration_s": 6.0, "sample_rate_hz": 500.0},
+    })  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "moved",
+    [
+        pytest.param(HEAVY, id="beyond the first corner of the spring: otherwise a nonlinear stiffness"),
+        pytest.param(
+            LIGHT, id="hardly beyond it, and all is taken for the drive's: otherwise a damaged tooth"
+        ),
+    ],
+)
+def test_a_mount_softer_than_the_drive_is_named(moved: tuple[float, float, dict[str, Any]]) -> None:
+    run = hdsim.simulate(arm(*moved, {"base_flexibility": {"stiffness_nm_per_rad": MOUNT}}))
+    base = arm(*moved, {})
+    bench = bench_for([noisy(run, NOISE, seed=1)], [], base, None)
+    found = refit(bench, state_of(base)).fit
+    lines = lines_of(bench, bench.residuals(found.predictions, drift=True), found.state.delays)
+    left = left_of(bench, found)
+    named = name_effect(bench, found, screen(bench, found.state, left, lines), left)
+    assert named is not None
+    assert named.name == "base_flexibility"
+    assert bench.power(named.fit.predictions) < 1.05 * bench.noise_power
+    mount = named.fit.state.added[-1].settings()["stiffness_nm_per_rad"]
+    assert mount == pytest.approx(MOUNT, rel=0.05)
