@@ -8,14 +8,14 @@ more is found, and all is asked once more when they have explained something.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
-from hdsim.diagnosis.contest import Fitted
+from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
@@ -52,6 +52,7 @@ class Stage:
     power: float
     screening: Screening | None = None
     named: Named | None = None
+    over_given: list[tuple[Named, Screening]] | None = field(default=None, repr=False)
 
 
 @dataclass
@@ -225,8 +226,8 @@ def _one_more(
     tell = during("fit", "fitting the shortlist")
     coordinate = places[0].coordinate if places else ""
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell, fitted=fitted)
-    if not found.named:
-        named = _over_the_given(bench, current, stage, named, during)
+    if not found.named or bench.power(current.predictions) > FAR_LEFT_IN * bench.noise_power:
+        named = _over_the_given(bench, current, found, stage, named, during)
     if named is None:
         return None
     change = left.project(bench.trace(current.predictions, named.fit.predictions))
@@ -245,32 +246,46 @@ def _one_more(
 
 
 def _over_the_given(
-    bench: Bench, base: Fit, stage: Stage, named: Named | None, during: Callable[[str, str], Step]
+    bench: Bench,
+    current: Fit,
+    found: Search,
+    stage: Stage,
+    named: Named | None,
+    during: Callable[[str, str], Step],
 ) -> Named | None:
-    """The first effect, or the one that is named over the base's numbers as given where that is likelier.
+    """The next effect, or the one that is named over the base's numbers as given where that is likelier.
 
-    A re-fit may bend the base far to stand in for a part of what is missing, and what is left then is no
-    trace of it any more.
+    A fit may bend the base far to stand in for a part of what is missing, and what is left then is no trace
+    of it any more.
     """
-    given = as_given(bench, base)
+    if stage.over_given is None:
+        stage.over_given = list(_named_over_the_given(bench, current, instead(found.named), during))
+    for other, screening in stage.over_given:
+        if named is None or unlikelihood(bench, other.fit, other.fit) < unlikelihood(
+            bench, named.fit, other.fit
+        ):
+            stage.screening = screening
+            return other
+    return named
+
+
+def _named_over_the_given(
+    bench: Bench, current: Fit, beaten: frozenset[str], during: Callable[[str, str], Step]
+) -> Iterator[tuple[Named, Screening]]:
+    """What is named over the base's numbers as given, if they have been bent and anything is."""
+    given = as_given(bench, current)
     if given is None:
-        return named
+        return
     left = left_of(bench, given)
     lines = lines_of(bench, bench.residuals(given.predictions, drift=True), given.state.delays)
     tell = during("screen", "screening the catalogue over the model as given")
-    screening = screen(bench, given.state, left, lines, on_step=tell)
+    screening = screen(bench, given.state, left, lines, leave_out=beaten, on_step=tell)
     if not screening.ranked or screening.chance > LEVEL:
-        return named
+        return
     tell = during("fit", "fitting the shortlist from the model as given")
-    other = name_effect(bench, given, screening, left, on_step=tell)
-    if other is None:
-        return named
+    named = name_effect(bench, given, screening, left, on_step=tell)
     if named is not None:
-        own, from_given = (unlikelihood(bench, each.fit, other.fit) for each in (named, other))
-        if own <= from_given:
-            return named
-    stage.screening = screening
-    return other
+        yield named, screening
 
 
 def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
