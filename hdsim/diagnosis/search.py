@@ -8,6 +8,7 @@ more is found, and all is asked once more when they have explained something.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,7 +20,7 @@ from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
-from hdsim.diagnosis.name import LEAST_SHARE, Named, name_effect
+from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
 from hdsim.diagnosis.point import as_given
 from hdsim.diagnosis.rest import hear_rest
 from hdsim.diagnosis.revise import base_alone, revised
@@ -226,7 +227,8 @@ def _one_more(
     tell = during("fit", "fitting the shortlist")
     coordinate = places[0].coordinate if places else ""
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell, fitted=fitted)
-    if not found.named or bench.power(current.predictions) > FAR_LEFT_IN * bench.noise_power:
+    least = bench.power(current.predictions if named is None else named.fit.predictions)
+    if not found.named or least > FAR_LEFT_IN * bench.noise_power:
         named = _over_the_given(bench, current, found, stage, named, during)
     if named is None:
         return None
@@ -259,7 +261,11 @@ def _over_the_given(
     of it any more.
     """
     if stage.over_given is None:
-        stage.over_given = list(_named_over_the_given(bench, current, instead(found.named), during))
+        # Beside the effects that are there a linear fit has to come near what is known already.
+        known = current if named is None else named.fit
+        enough = LINEAR * bench.power(known.predictions) if found.named else math.inf
+        beaten = instead(found.named)
+        stage.over_given = list(_named_over_the_given(bench, current, beaten, enough, during))
     for other, screening in stage.over_given:
         if named is None or unlikelihood(bench, other.fit, other.fit) < unlikelihood(
             bench, named.fit, other.fit
@@ -270,7 +276,7 @@ def _over_the_given(
 
 
 def _named_over_the_given(
-    bench: Bench, current: Fit, beaten: frozenset[str], during: Callable[[str, str], Step]
+    bench: Bench, current: Fit, beaten: frozenset[str], enough: float, during: Callable[[str, str], Step]
 ) -> Iterator[tuple[Named, Screening]]:
     """What is named over the base's numbers as given, if they have been bent and anything is."""
     given = as_given(bench, current)
@@ -281,6 +287,8 @@ def _named_over_the_given(
     tell = during("screen", "screening the catalogue over the model as given")
     screening = screen(bench, given.state, left, lines, leave_out=beaten, on_step=tell)
     if not screening.ranked or screening.chance > LEVEL:
+        return
+    if (1.0 - screening.ranked[0].share.share) * left.power > enough:
         return
     tell = during("fit", "fitting the shortlist from the model as given")
     named = name_effect(bench, given, screening, left, on_step=tell)

@@ -59,13 +59,26 @@ def rest_words(remains: Remains | None) -> str:
     return f" {100 * remains.share:.0f} % of the systematic residual remains, a function of the {coordinate}."
 
 
-def numbers_off(off: Sequence[Interval], common: Mapping[str, Any], *, sure: bool) -> Verdict:
+def numbers_off(off: Sequence[Interval], current: Fit, common: Mapping[str, Any], *, sure: bool) -> Verdict:
     """``parameter``, with those that are wrong."""
     changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
-    said = f"parameters of the model are wrong: {', '.join(changes)}."
+    said = f"parameters of the model are wrong: {', '.join(changes)}.{_or_in_series(off, current)}"
     if not sure:
         said = f"a parameter of the model is wrong, most simply {' or '.join(i.name for i in off)}."
     return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
+
+
+def _or_in_series(off: Sequence[Interval], current: Fit) -> str:
+    """What would look the same as a spring that is softer than is likely: by two spreads of its prior."""
+    names = {interval.name for interval in off}
+    softer = any(
+        free.compliance and free.name in names and float(t) - free.none < -2.0 * free.prior
+        for free, t in zip(current.frees, current.theta, strict=True)
+    )
+    laws = [
+        kind.title for kind in catalogue().values() if any(f.in_series for f in getattr(kind, "fittings", ()))
+    ]
+    return f" A compliance in series would look the same: {', '.join(laws)}." if softer else ""
 
 
 def fitted_number(interval: Interval) -> ParameterEstimate:

@@ -284,7 +284,7 @@ def _diagnosed(
             teeth = teeth_found(effects, current.state, (bench, current))
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
-        verdict = numbers_off(off, common, sure=bool(moved))
+        verdict = numbers_off(off, current, common, sure=bool(moved))
     else:
         said = "The data show no effect that is missing from the model."
         verdict = Verdict(verdict="nothing", sentence=said, **common)

@@ -10,12 +10,14 @@ import hdsim
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.name import name_effect
 from hdsim.diagnosis.traces import screen
+from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import refit
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 
+STIFFNESS = ("stiffness_k1_nm_per_rad", "stiffness_k2_nm_per_rad", "stiffness_k3_nm_per_rad")
 #: Stiffness of the mount, half of the drive's K1, N m/rad.
 MOUNT = 8e3
 #: Weight of the arm, kg; its inertia, kg m^2; how it moves.
@@ -58,3 +60,22 @@ def test_a_mount_softer_than_the_drive_is_named(moved: tuple[float, float, dict[
     assert bench.power(named.fit.predictions) < 1.05 * bench.noise_power
     mount = named.fit.state.added[-1].settings()["stiffness_nm_per_rad"]
     assert mount == pytest.approx(MOUNT, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("stiffness", "said"),
+    [
+        pytest.param(1.0 / 3.0, True, id="a third of the stiffness: a mount of half of it looks the same"),
+        pytest.param(0.75, False, id="three quarters: as catalogues scatter"),
+    ],
+)
+def test_a_spring_softer_than_is_likely_may_be_a_compliance_in_series(stiffness: float, said: bool) -> None:
+    """Below the first corner of the spring the mount is a softer spring, to the last digit."""
+    base = arm(0.5, 0.1, to_and_fro((60, -90, 45), 70, 60, 600), {})
+    torsion = base.drive.torsion
+    softer = torsion.model_copy(update={name: stiffness * getattr(torsion, name) for name in STIFFNESS})
+    plant = base.model_copy(update={"drive": base.drive.model_copy(update={"torsion": softer})})
+    found = diagnose([noisy(hdsim.simulate(plant), NOISE, seed=1)], base).verdict
+    assert found.verdict == "parameter"
+    assert ("in series would look the same: base flexibility" in found.sentence) is said
