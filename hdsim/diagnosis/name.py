@@ -106,6 +106,7 @@ def name_effect(
     on_step: Callable[[str], object] | None = None,
     fitted: Fitted | None = None,
     known_power: float = math.inf,
+    alone: Fit | None = None,
 ) -> Named | None:
     """Fit the screen's best in the simulated model and keep the best of them.
 
@@ -119,6 +120,8 @@ def name_effect(
         fitted: the base with each effect that was fitted for another residual of it; those of this one are
             added.
         known_power: what a model that is known leaves, which this one is to take the place of.
+        alone: the model without the effect where its own numbers explain a part of what ``base`` leaves: only
+            the rest is the effect's.
     """
     best = screening.ranked[0]
     known = catalogue()
@@ -140,8 +143,9 @@ def name_effect(
         results = contest(bench, base, shortlist, residual, on_step, fitted, known_power)
     if not results:
         return None
+    without = alone or base
     *results, (_, _, before) = against_priors(
-        bench, [*results, ("", base, bench.block_powers(base.predictions))]
+        bench, [*results, ("", without, bench.block_powers(without.predictions))]
     )
     results.sort(key=lambda result: float(result[2].sum()))
     explained = float((before - results[0][2]).sum())

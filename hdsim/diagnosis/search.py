@@ -291,7 +291,7 @@ def _named_over_the_given(
     if (1.0 - screening.ranked[0].share.share) * left.power > enough:
         return
     tell = during("fit", "fitting the shortlist from the model as given")
-    named = name_effect(bench, given, screening, left, on_step=tell)
+    named = name_effect(bench, given, screening, left, on_step=tell, alone=current)
     if named is not None:
         yield named, screening
 
