@@ -100,7 +100,7 @@ def rough_fits(
     if series and bench.power(point.predictions) > REACHED * bench.noise_power:
         alone = softest(bench, point, added, columns, stiff)
         if alone is not None:
-            begins.append((alone, np.zeros(len(moves))))
+            begins.append((np.array([alone]), np.zeros(len(moves))))
     if added.fitting.play:
         # By as much as the trace is too small, the spring beyond the play is stiffer.
         beyond = math.log(max(float(coefficients[0]), 1.0))

@@ -99,22 +99,15 @@ def contest(
     if not best:
         return []
     noise = bench.noise_power
-    least = least_left()
-    given = given_point(bench, base) if least > REACHED * noise else None
-    if given is not None:
-        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            near = [name for name in best if best[name][0] <= FAR_LEFT_IN * least]
-            nearest = sorted(near, key=lambda name: best[name][0])[:FAR_MOST]
-            for one in shortlist:
-                series = one.added.fitting.in_series and one.name in near
-                if one.name in nearest or series:
-                    tell(f"fitting {one.name} from the numbers as given")
-                    begun = _begun_at(bench, base, given, one)
-                    keep(one.name, begun)
-                    if series:
-                        # The bent base had what is its: on the way from there it leaves more at first.
-                        for nearest_one in _nearest_of_each(bench, begun):
-                            keep(one.name, full_fits(bench, base, nearest_one))
+    if (least := least_left()) > REACHED * noise:
+        near = [name for name in best if best[name][0] <= FAR_LEFT_IN * least]
+        nearest = sorted(near, key=lambda name: best[name][0])[:FAR_MOST]
+        rivals = [
+            one
+            for one in shortlist
+            if one.name in nearest or (one.added.fitting.in_series and one.name in near)
+        ]
+        _from_the_given(bench, base, rivals, keep, tell)
     _after_the_best(bench, base, shortlist, best, keep, tell)
     if (least := least_left()) > FAR_LEFT_IN * noise:
         _at_other_resonances(bench, base, shortlist, THERE * least, keep, tell)
@@ -132,6 +125,30 @@ def contest(
     for name in best:
         known[name] = best[name][1], name in full or name in further
     return [(name, found, bench.block_powers(found.predictions)) for name, (_, found) in best.items()]
+
+
+def _from_the_given(
+    bench: Bench,
+    base: Fit,
+    rivals: Sequence[Screened],
+    keep: Callable[[str, Iterable[Fit]], None],
+    tell: Callable[[str], object],
+) -> None:
+    """Fit candidates from the numbers as given, if the base has been bent; laws of compliance to their end.
+
+    The bent base had what is theirs: on the way from there they leave more at first.
+    """
+
+    def ended(there: Point, one: Screened) -> Iterator[Fit]:
+        begun = _begun_from(bench, base, there, one)
+        yield from begun
+        if one.added.fitting.in_series:
+            for each in _nearest_of_each(bench, begun):
+                yield from full_fits(bench, base, each)
+
+    given = given_point(bench, base)
+    if given is not None:
+        _from_point(given, "the numbers as given", rivals, ended, keep, tell)
 
 
 def _after_the_best(
@@ -183,10 +200,9 @@ def _at_other_resonances(
     rivals = [one for one in shortlist if not one.added.fitting.in_series]
 
     def ended(there: Point, one: Screened) -> Iterator[Fit]:
-        for each in (one, *one.others):
-            for begun in fits_from(bench, base, there, each.added, enough):
-                yield begun
-                yield from full_fits(bench, base, begun)
+        for begun in _begun_from(bench, base, there, one, enough):
+            yield begun
+            yield from full_fits(bench, base, begun)
 
     for factor in OTHER_RESONANCES:
         where = f"{factor:g} times the stiffness"
@@ -221,16 +237,17 @@ def _look_alikes(
     rivals = [one for one in shortlist if confusable(one.name, name) and (one.name in in_full or lags(one))]
 
     def ended(there: Point, one: Screened) -> Iterator[Fit]:
-        for each in _nearest_of_each(bench, _begun_at(bench, base, there, one)):
+        for each in _nearest_of_each(bench, _begun_from(bench, base, there, one)):
             yield from to_its_end(bench, base, each, LEFT_IN * loss)
 
     led = leader.theta[: len(base.frees)]
     _from_elsewhere(bench, base, led, f"where {name} led", rivals, ended, keep, tell)
 
 
-def _begun_at(bench: Bench, base: Fit, there: Point, one: Screened) -> list[Fit]:
-    """Fits of a candidate, in each of its formulas, begun at a point."""
-    return [found for each in (one, *one.others) for found in fits_from(bench, base, there, each.added)]
+def _begun_from(bench: Bench, base: Fit, there: Point, one: Screened, enough: float = math.inf) -> list[Fit]:
+    """Fits of a candidate, in each of its formulas, begun at a point where a linear fit leaves little."""
+    several = (one, *one.others)
+    return [found for each in several for found in fits_from(bench, base, there, each.added, enough)]
 
 
 def _nearest_of_each(bench: Bench, begun: Sequence[Fit]) -> Iterable[Fit]:
@@ -255,7 +272,19 @@ def _from_elsewhere(
     if not rivals:
         return
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-        there = point_at(bench, base, theta)
+        _from_point(point_at(bench, base, theta), where, rivals, fits, keep, tell)
+
+
+def _from_point(
+    there: Point,
+    where: str,
+    rivals: Sequence[Screened],
+    fits: Callable[[Point, Screened], Iterable[Fit]],
+    keep: Callable[[str, Iterable[Fit]], None],
+    tell: Callable[[str], object],
+) -> None:
+    """Fit candidates from a point, as many as can be predicted."""
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         for one in rivals:
             tell(f"fitting {one.name} from {where}")
             keep(one.name, fits(there, one))

@@ -227,9 +227,11 @@ def _one_more(
     tell = during("fit", "fitting the shortlist")
     coordinate = places[0].coordinate if places else ""
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell, fitted=fitted)
-    least = bench.power(current.predictions if named is None else named.fit.predictions)
-    if not found.named or least > FAR_LEFT_IN * bench.noise_power:
-        named = _over_the_given(bench, current, found, stage, named, during)
+    known_power = bench.power(current.predictions if named is None else named.fit.predictions)
+    if not found.named or known_power > FAR_LEFT_IN * bench.noise_power:
+        # Beside the effects that are there a linear fit has to come near what is known already.
+        enough = LINEAR * known_power if found.named else math.inf
+        named = _over_the_given(bench, current, instead(found.named), enough, stage, named, during)
     if named is None:
         return None
     change = left.project(bench.trace(current.predictions, named.fit.predictions))
@@ -250,7 +252,8 @@ def _one_more(
 def _over_the_given(
     bench: Bench,
     current: Fit,
-    found: Search,
+    beaten: frozenset[str],
+    enough: float,
     stage: Stage,
     named: Named | None,
     during: Callable[[str, str], Step],
@@ -261,10 +264,6 @@ def _over_the_given(
     of it any more.
     """
     if stage.over_given is None:
-        # Beside the effects that are there a linear fit has to come near what is known already.
-        known = current if named is None else named.fit
-        enough = LINEAR * bench.power(known.predictions) if found.named else math.inf
-        beaten = instead(found.named)
         stage.over_given = list(_named_over_the_given(bench, current, beaten, enough, during))
     for other, screening in stage.over_given:
         if named is None or unlikelihood(bench, other.fit, other.fit) < unlikelihood(

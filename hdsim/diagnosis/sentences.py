@@ -75,10 +75,10 @@ def _or_in_series(off: Sequence[Interval], current: Fit) -> str:
         free.compliance and free.name in names and float(t) - free.none < -2.0 * free.prior
         for free, t in zip(current.frees, current.theta, strict=True)
     )
-    laws = [
-        kind.title for kind in catalogue().values() if any(f.in_series for f in getattr(kind, "fittings", ()))
-    ]
-    return f" A compliance in series would look the same: {', '.join(laws)}." if softer else ""
+    if not softer:
+        return ""
+    kinds = [kind for kind in catalogue().values() if any(f.in_series for f in getattr(kind, "fittings", ()))]
+    return f" A compliance in series would look the same: {', '.join(kind.title for kind in kinds)}."
 
 
 def fitted_number(interval: Interval) -> ParameterEstimate:

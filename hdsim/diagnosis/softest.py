@@ -22,8 +22,8 @@ from hdsim.estimate.state import Added
 SCANNED, SCANNED_BY, NEAR_ENOUGH = (0.25, 0.5, 1.0, 2.0, 4.0), 2.0, 0.03
 
 
-def softest(bench: Bench, point: Point, added: Added, columns: Array, stiff: Mask) -> Array | None:
-    """Coefficients of the compliance that leaves least beside the base's own numbers, shape (k,).
+def softest(bench: Bench, point: Point, added: Added, columns: Array, stiff: Mask) -> float | None:
+    """Coefficient of the compliance that leaves least beside the base's own numbers.
 
     One as large as the drive's own moves the resonance so far that no linear fit finds it.
 
@@ -31,7 +31,7 @@ def softest(bench: Bench, point: Point, added: Added, columns: Array, stiff: Mas
         bench: the measured series.
         point: where the base is.
         added: the effect.
-        columns: its trace there, shape (rows, k).
+        columns: its trace there, shape (rows, 1).
         stiff: which of the point's numbers are stiffnesses, shape (p,).
 
     Returns:
@@ -44,11 +44,8 @@ def softest(bench: Bench, point: Point, added: Added, columns: Array, stiff: Mas
     if not own > 0:
         return None
 
-    def coefficients(part: float) -> Array:
-        return np.array([part * own, *added.coefficients[1:]])
-
     def left(parts: Sequence[float]) -> list[float]:
-        several = [replace(added, coefficients=tuple(coefficients(part))) for part in parts]
+        several = [replace(added, coefficients=(part * own,)) for part in parts]
         states = [replace(point.state, added=(*point.state.added, one)) for one in several]
         return [math.inf if there is None else bench.power(there) for there in bench.predict_all(states)]
 
@@ -60,4 +57,4 @@ def softest(bench: Bench, point: Point, added: Added, columns: Array, stiff: Mas
     found = minimize_scalar(
         lambda log: left([math.exp(log)])[0], bounds=bounds, method="bounded", options={"xatol": NEAR_ENOUGH}
     )
-    return coefficients(math.exp(float(found.x)) if found.fun < min(powers) else best)
+    return own * (math.exp(float(found.x)) if found.fun < min(powers) else best)

@@ -11,6 +11,7 @@ import numpy as np
 import hdsim
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.numbers import scaled
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import together
 from hdsim.estimate.state import Added
@@ -102,6 +103,22 @@ def with_effects(bench: Bench, found: Fit, *added: Added) -> Fit:
     state = replace(found.state, added=added)
     one = fit(bench, state, at_present(found), prune=False, after=found, evaluations=20, rough=True)
     return together(bench, one, rough=True)
+
+
+def bent(bench: Bench, found: Fit, factors: Mapping[str, float]) -> Fit:
+    """A fit with parameters, by their paths, that many times as large."""
+    frees = at_present(found)
+    theta = np.array([np.log(factors.get(free.name, 1.0)) for free in frees])
+    state = scaled(found.state, frees, theta.tolist())
+    return replace(found, state=state, frees=frees, theta=theta, predictions=bench.predict(state))
+
+
+def with_stiffness(scenario: Scenario, times: float) -> Scenario:
+    """A scenario whose drive's spring is that many times as stiff in all its sections."""
+    names = ("stiffness_k1_nm_per_rad", "stiffness_k2_nm_per_rad", "stiffness_k3_nm_per_rad")
+    torsion = scenario.drive.torsion
+    torsion = torsion.model_copy(update={name: times * getattr(torsion, name) for name in names})
+    return scenario.model_copy(update={"drive": scenario.drive.model_copy(update={"torsion": torsion})})
 
 
 def beyond(bench: Bench, found: Fit) -> float:

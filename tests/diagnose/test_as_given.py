@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from diagnose_bench import rigid_record, scenario
+from diagnose_bench import bent, rigid_record, scenario
 
 from hdsim.diagnosis.point import as_given
-from hdsim.estimate.fit import at_present
-from hdsim.estimate.numbers import scaled
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import refit
@@ -27,24 +22,16 @@ def fitted(tmp_path_factory):
     return bench, refit(bench, state_of(base)).fit
 
 
-def bent(bench, found, factor):
-    """The fit with the motor's inertia that many times as large."""
-    frees = at_present(found)
-    theta = np.array([math.log(factor) if free.name == INERTIA else 0.0 for free in frees])
-    state = scaled(found.state, frees, theta.tolist())
-    return replace(found, state=state, frees=frees, theta=theta, predictions=bench.predict(state))
-
-
 def test_a_model_that_has_not_gone_far_is_asked_once(fitted):
     bench, found = fitted
     assert as_given(bench, found) is None
-    assert as_given(bench, bent(bench, found, 1.8)) is None
+    assert as_given(bench, bent(bench, found, {INERTIA: 1.8})) is None
 
 
 @pytest.mark.parametrize("factor", [0.4, 5.0])
 def test_a_bent_model_goes_back_to_what_was_given_and_is_free_there(fitted, factor):
     bench, found = fitted
-    given = as_given(bench, bent(bench, found, factor))
+    given = as_given(bench, bent(bench, found, {INERTIA: factor}))
     assert number_at(given.state, INERTIA) == pytest.approx(5.0e-5)
     assert not given.theta.any()
     assert all(free.none == pytest.approx(0.0, abs=1e-12) for free in given.frees if not free.step)
@@ -58,7 +45,7 @@ def test_a_bent_model_goes_back_to_what_was_given_and_is_free_there(fitted, fact
 
 def test_where_the_model_as_given_cannot_be_predicted_the_bent_one_is_asked_alone(fitted, monkeypatch):
     bench, found = fitted
-    gone = bent(bench, found, 5.0)
+    gone = bent(bench, found, {INERTIA: 5.0})
 
     def fails(state):
         raise PredictionError("the spring's twist must grow with torque")

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnose_bench import with_stiffness
 from moves import NOISE, positioned, to_and_fro
 from noisy import noisy
 
@@ -25,7 +26,6 @@ from hdsim.scenario import Scenario
 #: Stiffness K1 of the preset, N m/rad; with the load it rings at 14 Hz, and the motor makes up to 20 turns a
 #: second: a quarter of it rings at 7 Hz, which an error twice a turn crosses as well, at half the speed.
 K1 = 1.6e4
-STIFFNESS = ("stiffness_k1_nm_per_rad", "stiffness_k2_nm_per_rad", "stiffness_k3_nm_per_rad")
 AMPLITUDE_ARCMIN = 2.0
 
 
@@ -43,10 +43,7 @@ def opened(times: float) -> tuple[Bench, Fit]:
     """A record with an error twice a turn, and the re-fit of a base with a part of the drive's stiffness."""
     component = {"order": 2, "amplitude_arcmin": AMPLITUDE_ARCMIN, "phase_deg": 30}
     run = hdsim.simulate(joint({"kinematic_error": {"components": [component]}}))
-    base = joint({})
-    torsion = {name: times * getattr(base.drive.torsion, name) for name in STIFFNESS}
-    torsion = base.drive.torsion.model_copy(update=torsion)
-    base = base.model_copy(update={"drive": base.drive.model_copy(update={"torsion": torsion})})
+    base = with_stiffness(joint({}), times)
     bench = bench_for([noisy(run, NOISE, seed=1)], [], base, None)
     return bench, refit(bench, state_of(base)).fit
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from diagnose_bench import with_stiffness
 from moves import NOISE, positioned, to_and_fro
 from noisy import noisy
 
@@ -17,7 +18,6 @@ from hdsim.estimate.refit import refit
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 
-STIFFNESS = ("stiffness_k1_nm_per_rad", "stiffness_k2_nm_per_rad", "stiffness_k3_nm_per_rad")
 #: Stiffness of the mount, half of the drive's K1, N m/rad.
 MOUNT = 8e3
 #: Weight of the arm, kg; its inertia, kg m^2; how it moves.
@@ -73,9 +73,7 @@ def test_a_mount_softer_than_the_drive_is_named(moved: tuple[float, float, dict[
 def test_a_spring_softer_than_is_likely_may_be_a_compliance_in_series(stiffness: float, said: bool) -> None:
     """Below the first corner of the spring the mount is a softer spring, to the last digit."""
     base = arm(0.5, 0.1, to_and_fro((60, -90, 45), 70, 60, 600), {})
-    torsion = base.drive.torsion
-    softer = torsion.model_copy(update={name: stiffness * getattr(torsion, name) for name in STIFFNESS})
-    plant = base.model_copy(update={"drive": base.drive.model_copy(update={"torsion": softer})})
-    found = diagnose([noisy(hdsim.simulate(plant), NOISE, seed=1)], base).verdict
+    run = hdsim.simulate(with_stiffness(base, stiffness))
+    found = diagnose([noisy(run, NOISE, seed=1)], base).verdict
     assert found.verdict == "parameter"
     assert ("in series would look the same: base flexibility" in found.sentence) is said
