@@ -28,7 +28,7 @@ class CandidateEvidence(Part):
     screened: float
     """Cross-validated share of the residual that its trace explained on the screen."""
     explained: float
-    """Part of what there was to explain beyond the noise that its fit explains; may exceed 1 a little."""
+    """Part that its fit explains of what there was to explain: all beyond the noise, or what any fit did."""
     behind: float = 0.0
     """Power that it leaves more than the best, as a part of what the best explains."""
     behind_spread: float = 0.0

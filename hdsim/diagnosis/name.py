@@ -179,6 +179,8 @@ def name_effect(
             same = max(same, MISMATCH * explained if freer else min(lacks, MISMATCH * explained))
         if difference.sum() < same:
             group[other] = float((before - rest).sum()) / explained
+    # No more than all that was to be explained, however little of it the noise may have left.
+    most = max(whole, *(float((before - rest).sum()) for _, _, rest in results))
     return Named(
         name,
         found,
@@ -188,7 +190,7 @@ def name_effect(
         on_screen[name].share.share,
         screening.chance,
         {other: each for other, each, _ in results[1:]},
-        [_as_evidence(result, results[0], before, whole, on_screen[result[0]]) for result in results],
+        [_as_evidence(result, results[0], before, most, on_screen[result[0]]) for result in results],
     )
 
 

@@ -74,6 +74,19 @@ def test_an_error_that_crosses_the_resonance_is_named_from_a_quarter_of_the_stif
 
 
 @pytest.mark.slow
+def test_of_what_the_noise_may_have_left_no_more_than_all_is_explained(
+    quarter: Quarter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, base, left, screening = quarter
+    loud = 2.0 * bench.power(base.predictions)
+    monkeypatch.setattr(Bench, "noise_power", property(lambda _: loud))
+    named = name_effect(bench, base, screening, left)
+    assert named is not None
+    assert max(one.explained for one in named.candidates) == pytest.approx(1.0)
+    assert all(one.explained <= 1.0 for one in named.candidates)
+
+
+@pytest.mark.slow
 def test_only_traces_that_the_spring_changes_are_made_anew(quarter: Quarter) -> None:
     bench, base, _, screening = quarter
     springs = [free for free in at_present(base) if free.compliance]
