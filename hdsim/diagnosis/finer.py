@@ -150,23 +150,30 @@ def _at_their_ends(bench: Bench, ways: Sequence[tuple[Fit, list[Added]]]) -> lis
     Returns:
         Where each has come to; without those that led nowhere.
     """
-    begun = (_fitted(bench, current, added) for current, added in ways)
+    begun = (_fitted(bench, current, added, begun=True) for current, added in ways)
     ends = [found for found in begun if found is not None]
-    on = list(range(len(ends)))
+    lower = {k: bench.power(found.predictions) for k, found in enumerate(ends)}
     for _ in range(TIMES):
-        lower: dict[int, float] = {}
+        on = sorted(lower, key=lower.__getitem__)[: math.ceil(CARRIED_ON * len(lower))]
+        lower = {}
         for k in on:
             further = _fitted(bench, ends[k], list(ends[k].state.added))
             if further is not None and bench.power(further.predictions) < bench.power(ends[k].predictions):
                 ends[k], lower[k] = further, bench.power(further.predictions)
-        on = sorted(lower, key=lower.__getitem__)[: math.ceil(CARRIED_ON * len(on))]
     return ends
 
 
-def _fitted(bench: Bench, current: Fit, added: list[Added]) -> Fit | None:
+def _fitted(bench: Bench, current: Fit, added: list[Added], *, begun: bool = False) -> Fit | None:
+    """A fit with these effects from where another has come to; ``begun``: there all but the last are known.
+
+    The other numbers do to the plain formula nearly what they do to a finer one that is as large.
+    """
     state = replace(current.state, added=tuple(added))
+    last = current.numbers_of(len(current.state.added) - 1)
+    known = (current.columns[:, : last.start], math.nan) if begun else None
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         return fit(
-            bench, state, at_present(current), prune=False, evaluations=EVALUATIONS, after=current, rough=True
-        )
+            bench, state, at_present(current), prune=False, evaluations=EVALUATIONS, after=current,
+            known=known, rough=True,
+        )  # fmt: skip
     return None

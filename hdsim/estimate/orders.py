@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.predict import Predictor
@@ -59,16 +60,17 @@ def order_lines(
     theta, e, turns, highest = over.angle, over.value, over.turns, over.highest
     power = float(np.mean(e**2))
     step = max(0.4 / turns, DENSE_ORDER / 600)
-    orders = np.arange(over.lowest, min(DENSE_ORDER, highest), step)
-    orders = np.unique(np.concatenate([orders, np.arange(np.ceil(over.lowest), int(highest) + 1)]))
+    dense = np.arange(over.lowest, min(DENSE_ORDER, highest), step)
+    whole = np.arange(math.ceil(over.lowest), int(highest) + 1, dtype=float)
+    orders, at = np.unique(np.concatenate([dense, whole]), return_index=True)
     if not len(orders):
         return []
-    waves = np.exp(-1j * np.outer(orders, theta))
+    waves = [_Waves(theta, even) for even in (dense, whole) if len(even)]
     lines: list[Line] = []
     refused: list[float] = []
     rest = e
     while len(lines) < most:
-        shares = 2.0 * np.abs(waves @ rest / len(rest)) ** 2 / power
+        shares = 2.0 * np.abs(np.concatenate([each.means(rest) for each in waves])[at]) ** 2 / power
         for order in (*(line.order for line in lines), *refused):
             shares[np.abs(orders - order) < 1.0 / turns] = 0.0
         k = int(np.argmax(shares))
@@ -169,8 +171,30 @@ def angle_read(predictor: Predictor, age_s: float) -> Array:
 def _refined(theta: Array, e: Array, order: float, step: float) -> float:
     """The order within one step of ``order`` whose line is strongest."""
     fine = order + step * np.linspace(-1.0, 1.0, 21)
-    power = [abs(np.mean(e * np.exp(-1j * n * theta))) for n in fine]
-    return float(fine[int(np.argmax(power))])
+    return float(fine[int(np.argmax(np.abs(_Waves(theta, fine).means(e))))])
+
+
+class _Waves:
+    """Waves e^(-i order angle) of evenly spaced orders over angles.
+
+    Each is the product of a slow one and a quick one, so that of m orders 2 sqrt(m) are computed.
+
+    Args:
+        angle: shape (n,), rad.
+        orders: shape (m,), evenly spaced.
+    """
+
+    def __init__(self, angle: Array, orders: Array) -> None:
+        self._count = len(orders)
+        step = orders[1] - orders[0] if self._count > 1 else 0.0
+        apart = math.isqrt(self._count - 1) + 1
+        self._slow = np.exp(-1j * np.outer(step * np.arange(apart), angle))
+        self._quick = np.exp(-1j * np.outer(orders[::apart], angle))
+
+    def means(self, values: Array) -> NDArray[np.complex128]:
+        """Mean of values, shape (n,), times each wave, shape (m,)."""
+        every = self._quick @ (self._slow * values).T
+        return np.asarray(every.ravel()[: self._count] / len(values))
 
 
 def power_of(

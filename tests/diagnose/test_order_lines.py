@@ -9,7 +9,7 @@ from hdsim.diagnosis.late import age_by_lines, lines_shown
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.orders import Line, order_lines, power_of
+from hdsim.estimate.orders import Line, _Waves, order_lines, power_of
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record
 
@@ -51,6 +51,16 @@ def test_an_order_that_grows_with_speed_is_one_line():
     assert orders(0.1 * np.sin(2.0 * angle) + 0.1 * np.sin(1.98 * angle + 1.0) + noise) == pytest.approx(
         [1.98, 2.0], abs=0.003
     )
+
+
+@pytest.mark.parametrize(
+    "orders", [[2.0], [1.0, 2.0], np.arange(0.5, 4.6, 0.0077), np.linspace(11.9, 12.1, 21)]
+)
+def test_a_spectrum_by_products_of_waves_is_that_of_the_waves(orders):
+    random = np.random.default_rng(3)
+    angle, values = 40.0 * np.cumsum(random.random(500)), random.standard_normal(500)
+    expected = np.exp(-1j * np.outer(orders, angle)) @ values / 500
+    assert _Waves(angle, np.array(orders)).means(values) == pytest.approx(expected, abs=1e-12)
 
 
 def test_an_order_just_beyond_half_the_sample_rate_is_that_order():
