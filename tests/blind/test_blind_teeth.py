@@ -92,6 +92,7 @@ def test_the_section_counts_what_is_asked():
     assert found["tooth within two, where one is named"] == (1, 2)
     text = "\n".join(teeth(lines, []))
     assert "| teeth/effect/x/1/1 | 3.5 to 10 | 1.5 | 1.2 | 1.1 to 1.4 | **no** |" in text
+    assert "2 of 2 estimates lie below the truth" in text
     assert "57 of the flexspline | 60.0 of the flexspline | 3.0 |" in text
     assert text in page(lines)
 
