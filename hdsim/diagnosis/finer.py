@@ -152,14 +152,15 @@ def _at_their_ends(bench: Bench, ways: Sequence[tuple[Fit, list[Added]]]) -> lis
     """
     begun = (_fitted(bench, current, added, begun=True) for current, added in ways)
     ends = [found for found in begun if found is not None]
-    lower = {k: bench.power(found.predictions) for k, found in enumerate(ends)}
+    left = {k: bench.power(found.predictions) for k, found in enumerate(ends)}
     for _ in range(TIMES):
-        on = sorted(lower, key=lower.__getitem__)[: math.ceil(CARRIED_ON * len(lower))]
-        lower = {}
+        on = sorted(left, key=left.__getitem__)[: math.ceil(CARRIED_ON * len(left))]
+        lower: dict[int, float] = {}
         for k in on:
             further = _fitted(bench, ends[k], list(ends[k].state.added))
-            if further is not None and bench.power(further.predictions) < bench.power(ends[k].predictions):
-                ends[k], lower[k] = further, bench.power(further.predictions)
+            if further is not None and (power := bench.power(further.predictions)) < left[k]:
+                ends[k], lower[k] = further, power
+        left = lower
     return ends
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.numbers import delay_freedoms
-from hdsim.estimate.orders import LEAST_LINE, Line, OverAngle, order_lines, over_angle
+from hdsim.estimate.orders import LEAST_LINE, Line, OverAngle, means_over, order_lines, over_angle
 from hdsim.estimate.records import Array
 
 #: Ages of a channel's readings that are tried, in samples (three spreads of what is believed of a delay), and
@@ -95,13 +95,7 @@ def _strongest(over: OverAngle, age: float) -> float:
     """Largest share of a channel's power at a whole order that can be seen, where it is read so late."""
     orders = np.arange(max(1.0, np.ceil(over.lowest)), int(over.highest) + 1)
     angle = over.angle - age * over.velocity
-    # Powers of one wave: a product for each order instead of a sine and a cosine.
-    wave = np.exp(-1j * angle)
-    waves = np.exp(-1j * orders[0] * angle) * over.value
-    shares = np.zeros(len(orders))
-    for k in range(len(orders)):
-        shares[k] = 2.0 * abs(waves.mean()) ** 2
-        waves *= wave
+    shares = 2.0 * np.abs(means_over(angle, over.value, orders)) ** 2
     return float(shares.max() / np.mean(over.value**2))
 
 

@@ -65,12 +65,12 @@ def order_lines(
     orders, at = np.unique(np.concatenate([dense, whole]), return_index=True)
     if not len(orders):
         return []
-    waves = [_Waves(theta, even) for even in (dense, whole) if len(even)]
     lines: list[Line] = []
     refused: list[float] = []
     rest = e
     while len(lines) < most:
-        shares = 2.0 * np.abs(np.concatenate([each.means(rest) for each in waves])[at]) ** 2 / power
+        means = np.concatenate([means_over(theta, rest, even) for even in (dense, whole)])[at]
+        shares = 2.0 * np.abs(means) ** 2 / power
         for order in (*(line.order for line in lines), *refused):
             shares[np.abs(orders - order) < 1.0 / turns] = 0.0
         k = int(np.argmax(shares))
@@ -171,30 +171,29 @@ def angle_read(predictor: Predictor, age_s: float) -> Array:
 def _refined(theta: Array, e: Array, order: float, step: float) -> float:
     """The order within one step of ``order`` whose line is strongest."""
     fine = order + step * np.linspace(-1.0, 1.0, 21)
-    return float(fine[int(np.argmax(np.abs(_Waves(theta, fine).means(e))))])
+    return float(fine[int(np.argmax(np.abs(means_over(theta, e, fine))))])
 
 
-class _Waves:
-    """Waves e^(-i order angle) of evenly spaced orders over angles.
+def means_over(angle: Array, values: Array, orders: Array) -> NDArray[np.complex128]:
+    """Means of values times the waves e^(-i order angle) of evenly spaced orders, shape (m,).
 
-    Each is the product of a slow one and a quick one, so that of m orders 2 sqrt(m) are computed.
+    Each wave is a product of the one before, instead of a sine and a cosine.
 
     Args:
         angle: shape (n,), rad.
+        values: shape (n,).
         orders: shape (m,), evenly spaced.
     """
-
-    def __init__(self, angle: Array, orders: Array) -> None:
-        self._count = len(orders)
-        step = orders[1] - orders[0] if self._count > 1 else 0.0
-        apart = math.isqrt(self._count - 1) + 1
-        self._slow = np.exp(-1j * np.outer(step * np.arange(apart), angle))
-        self._quick = np.exp(-1j * np.outer(orders[::apart], angle))
-
-    def means(self, values: Array) -> NDArray[np.complex128]:
-        """Mean of values, shape (n,), times each wave, shape (m,)."""
-        every = self._quick @ (self._slow * values).T
-        return np.asarray(every.ravel()[: self._count] / len(values))
+    means = np.zeros(len(orders), dtype=np.complex128)
+    if not len(orders):
+        return means
+    waves = np.exp(-1j * orders[0] * angle) * values
+    # From the ends: two that are next to one another say little of how far apart they are.
+    step = np.exp(-1j * (orders[-1] - orders[0]) / max(len(orders) - 1, 1) * angle)
+    for k in range(len(orders)):
+        means[k] = waves.mean()
+        waves *= step
+    return means
 
 
 def power_of(

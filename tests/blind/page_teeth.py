@@ -91,30 +91,28 @@ def teeth(stated: Sequence[Line], others: Sequence[Line]) -> list[str]:
         return []
     text = ["## Against a base with teeth (`teeth`)", ""]
     text += [*requirements(measures, ASKED, "", stated, others), ""]
-    told = [own for r in stated if (own := half_gap(r)) is not None]
-    below = sum(value < truth for truth, value, *_ in told)
-    text += [
-        f"Half-gaps that were told, um. {below} of {len(told)} estimates lie below the truth: the gaps",
-        "of the plants have all grown in proportion, and where the name is `output_backlash`, the estimate",
-        "is of gaps that are all wider by the same, whose mean is less for the same wind-up (the teeth with",
-        "the least gap touch first). The interval spans both ways.",
-        "",
-        *_gaps(stated),
-        "",
-    ]
+    text += [*_gaps(stated), ""]
     return [*text, "Teeth that were named, `inf` on the wrong spline:", "", *_teeth(stated), ""]
 
 
 def _gaps(lines: Sequence[Line]) -> list[str]:
-    rows = []
+    rows, below = [], 0
     for r in lines:
         own = half_gap(r)
         if own is not None:
+            below += own[1] < own[0]
             truth, value, low, high = (f"{number:.3g}" for number in own)
             ends, holds = f"{low} to {high}", "yes" if held(r) else "**no**"
             name = f"`{r['verdict']['effects'][0]['name']}`"
             rows.append([r["key"], band(r), truth, value, ends, holds, name])
-    return table(["key", "strength", "truth", "estimate", "95 % interval", "holds", "named"], rows)
+    return [
+        f"Half-gaps that were told, um. {below} of {len(rows)} estimates lie below the truth: the gaps",
+        "of the plants have all grown in proportion, and where the name is `output_backlash`, the estimate",
+        "is of gaps that are all wider by the same, whose mean is less for the same wind-up (the teeth with",
+        "the least gap touch first). The interval spans both ways.",
+        "",
+        *table(["key", "strength", "truth", "estimate", "95 % interval", "holds", "named"], rows),
+    ]
 
 
 def _teeth(lines: Sequence[Line]) -> list[str]:

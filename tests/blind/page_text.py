@@ -96,7 +96,8 @@ are treated and of how finely a motion is followed; those of `real` from 90 to 1
 spectra apart from 0.9 of a beat on (34 of 36 were right; the others from 52 to 56 with lines of any
 distance). The calibration cases are of older searches.
 
-The last three rows are whole classes, run again whatever their outcome had been. Their rates had been seen.
+The last three rows are whole classes, run again whatever their outcome had been, but for `teeth`, which are
+new. Their rates had been seen.
 
 - *LARA8's joint.* It is drawn anew: the drive yields to what is injected as the joint's own ringing shows
   (14 Hz), and no longer by the stiffness that its source states and an inertia with the rotor's in it, with

@@ -9,7 +9,7 @@ from hdsim.diagnosis.late import age_by_lines, lines_shown
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.orders import Line, _Waves, order_lines, power_of
+from hdsim.estimate.orders import Line, means_over, order_lines, power_of
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.records import Record
 
@@ -60,7 +60,7 @@ def test_a_spectrum_by_products_of_waves_is_that_of_the_waves(orders):
     random = np.random.default_rng(3)
     angle, values = 40.0 * np.cumsum(random.random(500)), random.standard_normal(500)
     expected = np.exp(-1j * np.outer(orders, angle)) @ values / 500
-    assert _Waves(angle, np.array(orders)).means(values) == pytest.approx(expected, abs=1e-12)
+    assert means_over(angle, values, np.array(orders)) == pytest.approx(expected, abs=1e-12)
 
 
 def test_an_order_just_beyond_half_the_sample_rate_is_that_order():
