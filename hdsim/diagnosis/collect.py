@@ -178,6 +178,8 @@ def _rest(bench: Bench, predictions: Sequence[Array]) -> RestEvidence | None:
     for series, residual in zip(bench.series, bench.residuals(predictions, drift=True), strict=True):
         if series.record >= bench.training or not series.train.any() or series.noise <= 0:
             continue
+        if bench.of_the_load(series):
+            continue
         # In units of a single reading's noise, however many a sample is the mean of.
         beyond = float(np.mean(residual[series.train] ** 2)) - series.noise**2
         times = float(np.sqrt(max(1.0 + beyond / series.reading**2, 0.0)))

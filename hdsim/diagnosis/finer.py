@@ -15,6 +15,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -37,36 +38,36 @@ EVALUATIONS, TIMES = 14, 2
 CARRIED_ON = 0.5
 
 
-def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]) -> Fit:
-    """The model with its newest effect in a finer formula, if that explains what is left.
+def refined(
+    bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object], rivals: Sequence[Fit] = ()
+) -> Fit:
+    """The model with its newest effect, or a look-alike, in a finer formula, if that explains what is left.
 
     Args:
         bench: the measured series.
         base: the re-fitted model without effects.
         current: the model.
         tell: told what is being done.
+        rivals: the model with look-alikes of the newest effect in its place, whose formulas are asked where
+            its own do not explain all.
     """
     noise = bench.noise_power
-    *others, plain = current.state.added
-    begins = list(_begins(bench, current, plain))
-    if bench.power(current.predictions) <= REACHED * noise or not begins:
+    if bench.power(current.predictions) <= REACHED * noise:
         return current
-    tell(f"fitting a finer {plain.effect}")
+    inside: list[Fit] = []
+    for asked in (current, *rivals):
+        if min(bench.power(found.predictions) for found in (current, *inside)) <= REACHED * noise:
+            break
+        begins = list(_begins(bench, asked, asked.state.added[-1]))
+        if begins:
+            tell(f"fitting a finer {asked.state.added[-1].effect}")
+            inside += _in_finer(bench, asked, begins)
+    if not inside:
+        return current
     with bench.coarse():
-        ways = [(current, [*others, one]) for one in _nearest(bench, current, begins)]
-        given = as_given(bench, current)
-        if given is not None:
-            # A plain formula may have bent the base to stand in for what it lacks.
-            ways += [(given, [*others, one]) for one in _nearest(bench, given, begins)]
-        ends = _at_their_ends(bench, ways)
-        # At the end of a range its further numbers are told no more.
-        inside = [found for found in ends if not found.state.added[-1].at_limit]
-        if inside:
-            inside += _with_fewer(bench, min(inside, key=lambda found: bench.power(found.predictions)))
         # The plain one may not have been at its end.
-        as_it_is = _at_their_ends(bench, [(current, [*others, plain])])
-    plain_end = as_it_is[0] if as_it_is else current
-    least = min([plain_end, *inside], key=lambda found: bench.power(found.predictions))
+        plain = next(iter(_at_their_ends(bench, [(current, list(current.state.added))])), current)
+    least = min([plain, *inside], key=lambda found: bench.power(found.predictions))
     rest, blocks = bench.stacked(bench.residuals(least.predictions)), bench.stacked_blocks()
     sample, number = bench.sample_power(rest), worth_of_a_number(rest, blocks)
 
@@ -74,10 +75,26 @@ def refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]
         """Of the data, of the priors, and of the effect's numbers."""
         return sample * unlikelihood(bench, found, least) + number * found.state.added[-1].freedom
 
-    best = min(inside, key=cost, default=plain_end)
-    missing, left = (bench.power(each.predictions) - noise for each in (base, plain_end))
+    best = min(inside, key=cost, default=plain)
+    missing, left = (bench.power(each.predictions) - noise for each in (base, plain))
     matters = min(BEYOND_GAIN * missing, max(NEWS * left, EXCESS * noise))
-    return sharpened(bench, best) if cost(plain_end) - cost(best) > matters else current
+    return sharpened(bench, best) if cost(plain) - cost(best) > matters else current
+
+
+def _in_finer(bench: Bench, current: Fit, begins: Sequence[Added]) -> list[Fit]:
+    """Fits of a model with its newest effect in finer formulas that do not end at the end of a range."""
+    others = current.state.added[:-1]
+    with bench.coarse():
+        ways = [(current, [*others, one]) for one in _nearest(bench, current, begins)]
+        given = as_given(bench, current)
+        if given is not None:
+            # A plain formula may have bent the base to stand in for what it lacks.
+            ways += [(given, [*others, one]) for one in _nearest(bench, given, begins)]
+        # At the end of a range its further numbers are told no more.
+        inside = [found for found in _at_their_ends(bench, ways) if not found.state.added[-1].at_limit]
+        if inside:
+            inside += _with_fewer(bench, min(inside, key=lambda found: bench.power(found.predictions)))
+    return inside
 
 
 def each_refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]) -> Fit:
@@ -92,10 +109,13 @@ def each_refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], ob
 def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
     """An effect in the others of its finer formulas, as large as it is: their further terms at none.
 
-    Shapes that it has already begin where they are.
+    Shapes that it has already begin where they are, and at the next minima that they may have there.
     """
     finer: tuple[Fitting, ...] = catalogue()[plain.effect].finer
-    own = dict(zip((shape.path for shape in plain.fitting.shapes), plain.shapes, strict=True))
+    own = {
+        shape.path: (value, *shape.next_minima(value))
+        for shape, value in zip(plain.fitting.shapes, plain.shapes, strict=True)
+    }
     label, settings = plain.fitting.label, plain.settings()
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
@@ -105,12 +125,12 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
         begun = set()
         for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
             pairs = zip(fitting.shapes, one.shapes, strict=True)
-            shapes = tuple(own.get(shape.path, start) for shape, start in pairs)
-            if shapes in begun:
-                continue  # starts of a shape that the effect has already are one
-            begun.add(shapes)
-            coefficients = [c for term in one.fitting.terms for c in term.read(settings)]
-            yield replace(one, coefficients=tuple(coefficients), shapes=shapes)
+            coefficients = tuple(c for term in one.fitting.terms for c in term.read(settings))
+            # Starts of a shape that the effect has already are one.
+            for shapes in product(*(own.get(shape.path, (start,)) for shape, start in pairs)):
+                if shapes not in begun:
+                    begun.add(shapes)
+                    yield replace(one, coefficients=coefficients, shapes=shapes)
 
 
 def _with_fewer(bench: Bench, found: Fit) -> list[Fit]:

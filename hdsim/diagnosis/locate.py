@@ -151,6 +151,9 @@ def _designs(
     """Name, columns (rows, k) and corners of a curve for every coordinate of one channel."""
     everything = {k: coordinates(bench, bench.series[k], residuals) for k in own}
     names = list(dict.fromkeys(name for found in everything.values() for name in found))
+    sensed = bench.of_the_load(bench.series[own[0]])
+    if sensed:
+        names = ["output_angle"]  # a load may vibrate, or depend on anything else
     result: list[tuple[str, Array, Array | None]] = []
     for name in names:
         if not all(name in found for found in everything.values()):
@@ -168,14 +171,15 @@ def _designs(
         if name == "output_angle":
             fine = np.linspace(values.min(), values.max(), FINE_CORNERS)
             result.append((name, _placed(bench, own, hats(values, fine)), fine))
-        if name in ("velocity", "torque", "output_angle"):
+        if name in ("velocity", "torque", "output_angle") and not sensed:
             # Friction and loss are odd in speed: with the direction.
             turned = np.concatenate([everything[k]["direction"][bench.series[k].train] for k in own])
             size = values if name == "output_angle" else np.abs(values)
             both = np.hstack([hats(values, corners), turned[:, None] * hats(size, corners)])
             result.append((name, _placed(bench, own, both), None))
-    ringing = np.vstack([oscillators(bench, bench.series[k])[bench.series[k].train] for k in own])
-    result.append(("frequency", _placed(bench, own, ringing), None))
+    if not sensed:
+        ringing = np.vstack([oscillators(bench, bench.series[k])[bench.series[k].train] for k in own])
+        result.append(("frequency", _placed(bench, own, ringing), None))
     angle = np.concatenate(
         [angle_read(bench.predictors[bench.series[k].record], age_s)[bench.series[k].train] for k in own]
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnosis.contest import Fitted, against_priors, confusable, contest
+from hdsim.diagnosis.contest import LEFT_IN, Fitted, against_priors, confusable, contest
 from hdsim.diagnosis.evidence import CandidateEvidence
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, Screening
@@ -94,6 +94,30 @@ class Named:
     less: Fit | None = None
     alike: frozenset[str] = frozenset()
     instead_of: frozenset[str] = frozenset()
+
+    def look_alikes(self, bench: Bench) -> list[Fit]:
+        """The alternatives that look like it and leave not much more, those that leave least first."""
+        enough = LEFT_IN * bench.power(self.fit.predictions)
+        left = {name: bench.power(each.predictions) for name, each in self.alternatives.items()}
+        near = [name for name in left if left[name] <= enough and confusable(self.name, name)]
+        return [self.alternatives[name] for name in sorted(near, key=left.__getitem__)]
+
+    def gives_way(self, bench: Bench, before: Fit, own: Fit, found: Fit) -> None:
+        """Take the name of a look-alike that explains more in a finer formula.
+
+        Args:
+            bench: the measured series.
+            before: the model without either.
+            own: the model with this one.
+            found: the model with the other instead.
+        """
+        name, none = found.state.added[-1].effect, bench.power(before.predictions)
+        part = (none - bench.power(own.predictions)) / (none - bench.power(found.predictions))
+        self.alternatives = {k: each for k, each in self.alternatives.items() if k != name} | {
+            self.name: self.fit
+        }
+        self.group = {self.name: part} if part > 1.0 - MISMATCH else {}
+        self.name, self.fit = name, found
 
 
 def name_effect(

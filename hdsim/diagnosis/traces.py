@@ -6,11 +6,12 @@ channels together is its trace. The cross-validated share of the residual that i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hdsim.diagnosis.behind import behind_sensor
 from hdsim.diagnosis.designs import traces
 from hdsim.diagnosis.locate import Place
 from hdsim.diagnosis.remembered import Traces, key_of, remembered
@@ -20,7 +21,6 @@ from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.orders import Line
-from hdsim.estimate.predict import CARRIED, PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State, number_at
 
@@ -231,29 +231,6 @@ def ranked_anew(screening: Screening, residual: Residual) -> Screening:
 def _home(name: str) -> str:
     """The coordinate in which an effect shows most."""
     return catalogue()[name].signature.lives_in[0]
-
-
-def behind_sensor(
-    bench: Bench, state: State, name: str, fitting: Fitting, ranges: Mapping[str, float]
-) -> bool:
-    """Whether an effect acts on the output, in records whose load is what the output's torque sensor reads.
-
-    Such an effect changes the torque that the sensor has measured already, so it cannot be missing there.
-    """
-    first = bench.predictors[0]
-    if first.plan.load != "output_torque":
-        return False
-    for added in starts(name, fitting, (), ranges)[:1]:
-        try:
-            without = first.predict(state.candidate())
-            tried = replace(state, added=(*state.added, added))
-            there = first.predict(tried.candidate())
-        except PredictionError:
-            return True
-        torque = float(np.std(there[CARRIED] - without[CARRIED])) / abs(first.ratio)
-        motor = float(np.std(there.get("motor_torque", np.zeros(1)) - without.get("motor_torque", 0.0)))
-        return torque > 0.5 * motor and torque > 0.0
-    return False
 
 
 def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:

@@ -44,6 +44,11 @@ def maxwell_slip(inputs: Any, parameters: Any, own: int, columns: int, outputs: 
         outputs[STORED] += 0.5 * force * force / stiffness
 
 
+#: Over less it would be a friction at the output, over more a spring. Shifted by one, the elements that slip
+#: at 0.1, 0.3 and 0.8 mrad almost cover one another.
+_SCALE = Shape("slip_twist_scale", (0.5, 1.0), least=0.1, most=2.0, apart=math.sqrt(8.0))
+
+
 class SlipElement(Parameters):
     """A spring in series with a slider."""
 
@@ -63,8 +68,10 @@ class TorsionalHysteresisMaxwell(Effect):
     what an element can lose is 1/p of its torque. (Without that threshold, as in Bouc-Wen's |F/W|^p, every
     cycle under a bias takes a part of it.)
 
-    Without ``elements``, ``slip_torque_nm`` is shared equally by elements that slip at ``slip_twists_mrad``
-    times ``slip_twist_scale``.
+    Without ``elements``, ``slip_torque_nm`` is shared by elements that slip at ``slip_twists_mrad`` times
+    ``slip_twist_scale``: equally, or in proportion to the ``share_exponent``-th power of these twists. Every
+    law whose branches are nested is such a distribution (Iwan 1966); Segalman's (2005) power law of sliders,
+    phi^chi dphi, has chi = share_exponent - 2 where the twists are a geometric series.
     The elements stiffen the drive on reversal by sum k_i; a catalogue stiffness contains that already.
 
     The defaults are those of size 20. The loop's width at zero torque is about 2 W/K1, and a catalogue prints
@@ -75,7 +82,8 @@ class TorsionalHysteresisMaxwell(Effect):
     title: ClassVar[str] = "torsional hysteresis (Maxwell slip)"
     source: ClassVar[str] = (
         "Tjahjowidodo, Al-Bender and Van Brussel 2013, Mechatronics 23:497 (spring plus Maxwell slip); "
-        "no slip below a threshold: Iwan 1966, J. Appl. Mech. 33:893 (elements of ideal friction); level: "
+        "no slip below a threshold: Iwan 1966, J. Appl. Mech. 33:893 (elements of ideal friction); power law "
+        "of their torques: Segalman 2005, J. Appl. Mech. 72:752; level: "
         "catalogue hysteresis loss below 1 arcmin times K1, 2 sum W <= 4.6 N m for size 20"
     )
     signature: ClassVar[Signature] = Signature(
@@ -95,9 +103,15 @@ class TorsionalHysteresisMaxwell(Effect):
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
             (Amplitude({"slip_torque_nm": 1.0}),),
-            # Over less it would be a friction at the output, over more a spring.
-            # Shifted by one, the elements that slip at 0.1, 0.3 and 0.8 mrad almost cover one another.
-            (Shape("slip_twist_scale", (0.5, 1.0), least=0.1, most=2.0, apart=math.sqrt(8.0)),),
+            (_SCALE,),
+        ),
+    )
+    finer: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (Amplitude({"slip_torque_nm": 1.0}),),
+            (_SCALE, Shape("share_exponent", (-1.0, 1.0), linear=True)),
+            settings={"slip_twists_mrad": (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.56, 0.8)},
+            label="that slips at many twists",
         ),
     )
 
@@ -116,6 +130,10 @@ class TorsionalHysteresisMaxwell(Effect):
         float, Plausible(0.1, 2.0, "the last twist within the wind-up of the first stiffness")
     ] = Field(1.0, gt=0)
     """Factor on ``slip_twists_mrad``: of a stiffer or a softer drive."""
+    share_exponent: Annotated[float, Plausible(-3.0, 3.0, "beyond that one element has nearly all")] = Field(
+        0.0, ge=-5, le=5
+    )
+    """Exponent of an element's share of the torque as a power of its twist; 0: equal shares."""
     # Beyond a thousand a solver sees a corner.
     sharpness: Annotated[float, FIXED] = Field(200.0, ge=1, le=1000)
     """Inverse p of the share of W over which an element begins to slip."""
@@ -140,10 +158,12 @@ class TorsionalHysteresisMaxwell(Effect):
         """The elements in use, given or shared out."""
         if self.elements is not None:
             return self.elements
-        share = self.slip_torque_nm / len(self.slip_twists_mrad)
+        last = max(self.slip_twists_mrad)
+        parts = [(x / last) ** self.share_exponent for x in self.slip_twists_mrad]
+        shares = [self.slip_torque_nm * part / sum(parts) for part in parts]
         return tuple(
             SlipElement(stiffness_nm_per_rad=share / (1e-3 * self.slip_twist_scale * x), slip_torque_nm=share)
-            for x in self.slip_twists_mrad
+            for x, share in zip(self.slip_twists_mrad, shares, strict=True)
         )
 
     def contribute(self, build: Builder) -> None:

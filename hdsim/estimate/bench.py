@@ -98,6 +98,10 @@ class Bench:
         """Whether the load is the measured torque at the output."""
         return all(predictor.plan.load == "output_torque" for predictor in self.predictors)
 
+    def of_the_load(self, series: Series) -> bool:
+        """Whether a series is a sensor that is the load: only what goes round with a shaft is its error."""
+        return self.load_known and series.channel == "output_torque"
+
     @property
     def noise_powers(self) -> dict[str, float]:
         """What the sensors' noise alone leaves of each channel's whitened training residual, as power."""

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdsim.errors import InputError
-from hdsim.estimate.spline import drawn_anew, pieces_of, spline_through
+from hdsim.estimate.spline import drawn_anew, pieces_of, signal, spline_through
 
 if TYPE_CHECKING:
     from hdsim.actuation.arm import Arm, Course
+    from hdsim.actuation.signal_data import SignalData
+    from hdsim.drive.parameters import Drive
     from hdsim.estimate.records import Array, Record
     from hdsim.parts import Builder
 
@@ -25,6 +27,42 @@ class Gravity:
         """Add the weight."""
         if self.load.gravity is not None:
             self.load.gravity.contribute(build)
+
+
+def beside_readings(load: Any, drive: Drive, *, sensed: bool) -> tuple[list[Gravity], float]:
+    """What a scenario's load is beside a torque that was measured: its weight, and its inertia, kg m^2.
+
+    Args:
+        load: of the scenario.
+        drive: whose output it is on.
+        sensed: the torque is that of a sensor at the output: all beyond it is in its reading, and a flange
+            before it is no heavier than the ring.
+    """
+    if sensed:
+        return [], min(load.inertia_kg_m2, drive.inertia.ring_kg_m2)
+    return [Gravity(load)], load.inertia_kg_m2
+
+
+class MeasuredLoad:
+    """A load's torque as a sensor read it: a smoothing spline through its readings.
+
+    Args:
+        time: shape (n,), s.
+        torque_nm: shape (n,), on the output.
+        step_nm: of the sensor.
+    """
+
+    def __init__(self, time: Array, torque_nm: Array, step_nm: float) -> None:
+        self._time, self._torque = time, torque_nm
+        self._spline, _ = spline_through(time, torque_nm, step=step_nm)
+
+    def signal(self, lead_in_s: float, rng: np.random.Generator | None = None) -> SignalData:
+        """The torque over time, after a lead-in at its initial value; ``rng`` draws the readings anew."""
+        breaks, coefficients = pieces_of(self._spline)
+        if rng is not None:
+            drawn = drawn_anew(self._time, self._torque, self._spline, rng)
+            coefficients = coefficients if drawn is None else drawn
+        return signal(breaks, coefficients, lead_in_s, steady=True)
 
 
 def arm_course(record: Record, arm: Arm, rng: np.random.Generator | None = None) -> Course:

@@ -1,7 +1,8 @@
-"""What the noise of a prescribed motion does to what is predicted along it.
+"""What the noise of a prescribed motion, and of a measured load, does to what is predicted.
 
-A prediction answers to its motion's errors as to the motion: a lightly damped load swings with them. That is
-noise of the comparison, though no sensor of the compared channel has it.
+A prediction answers to its motion's errors as to the motion: a lightly damped load swings with them. The
+spring is wound up by the noise of the torque that is given. That is noise of the comparison, though no sensor
+of the compared channel has it.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Array]) -> None:
-    """Add to every series' noise what the noise of the prescribed motion does to its prediction.
+    """Add to every series' noise what the noise of the prescribed motion and load does to its prediction.
 
     A fit leaves least where the model answers to that noise least (regression dilution: R. J. Carroll et al.,
     *Measurement Error in Nonlinear Models*, 2nd ed., Chapman and Hall 2006, section 1.1), as a rule by too
@@ -55,7 +56,7 @@ def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Arr
 
 
 def _answers(bench: Bench, state: State) -> Iterator[tuple[int, Array]]:
-    """What another reading of the motion changes in each series that a model then predicts."""
+    """What another reading of motion and load changes in each series that a model then predicts."""
     candidate = state.candidate()
     for index, predictor in enumerate(bench.predictors):
         other = predictor.disturbed()

@@ -48,6 +48,11 @@ def plan_for(record: Record, *, load: LoadSource | None = None, locked: Locked =
         load = "load_torque" if "load_torque" in moving else "scenario"
     if load != "scenario" and load not in has:
         raise InputError(f"{record.name}: the load is to come from {load}, which is not measured")
+    if locked and load == "output_torque":
+        raise InputError(
+            f"{record.name}: the {locked} is locked, so output_torque is what a model predicts and no "
+            "load; leave load to the scenario"
+        )
     if locked == "motor":
         return _motor_locked(record, moving)
     if "motor_angle" in has:

@@ -3,9 +3,9 @@
 The motion is prescribed, so an unstable or unknown controller does not matter and nothing drifts away.
 With both encoders the motor's motion is prescribed, output motion and torques are predicted. Without the
 motor's encoder the output's motion times the ratio stands for it, and torques are predicted. Where the
-reading of the output's torque sensor is the load, the sensor is compared with the slow part of its own
-reading: its ripple is faster than a load that is carried. A measured temperature is given to the parts that
-follow it, smoothed as the load.
+reading of the output's torque sensor is the load, all of the scenario's load is in it, and the sensor is
+compared with its slow part: its ripple is faster than a load that is carried. A measured temperature is given
+to the parts that follow it, smoothed as the load.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import PhysicsError
-from hdsim.estimate.known_load import Gravity, arm_course
+from hdsim.estimate.known_load import MeasuredLoad, arm_course, beside_readings
 from hdsim.estimate.lead_in import LeadInDamper
 from hdsim.estimate.noise import (
     noise_of_means,
@@ -46,8 +46,6 @@ if TYPE_CHECKING:
 
 #: Time for which the model runs before the record begins, so that its own oscillation has died away, s.
 LEAD_IN_S = 0.5
-#: Name of the torque that a model's output carries, where the sensor's reading is given.
-CARRIED = "carried_torque"
 #: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
 #: noise in a Jacobian looks like information; and the tolerance of a search, whose steps are larger.
 RTOL, COARSE_RTOL = 1e-6, 3e-5
@@ -114,24 +112,24 @@ class Predictor:
         self.turn(0.0)
         #: Motor speed over which a sticking drive's sign of friction is smoothed, rad/s.
         self.smoothing = RESOLVED_RAD_PER_S
-        self.load_torque: SignalData | None = None
+        self._load: MeasuredLoad | None = None
         if plan.load != "scenario":
-            step = self._step(plan.load)
             carried = self._means.behind(record.filled(plan.load))
-            breaks, coefficients = smoothed(record.time, carried, step=step)
             sign = -1.0 if plan.load == "output_torque" else 1.0
-            self.load_torque = signal(breaks, sign * coefficients, LEAD_IN_S, steady=True)
+            self._load = MeasuredLoad(record.time, sign * carried, self._step(plan.load))
+        self.load_torque = None if self._load is None else self._load.signal(LEAD_IN_S)
         #: What a part may ask for beside the motion (``Builder.external``).
         self.signals: dict[str, SignalData] = {}
         if "temperature" in record.readable:
             found = smoothed(record.time, record.filled("temperature"))
             self.signals["temperature"] = signal(*found, LEAD_IN_S, steady=True)
-        self._slow: SlowPart | None = None
+        #: The part of a channel that a slow load could be, where the torque sensor's reading is the load.
+        self.slow: SlowPart | None = None
         if plan.load == "output_torque":
             factor = ratio if plan.motion == "output_angle" else 1.0
-            self._slow = SlowPart(record.time, factor * values / (2 * np.pi))
+            self.slow = SlowPart(record.time, factor * values / (2 * np.pi))
             #: What the sensor that is the load is compared with, shape (n,).
-            self.slow_torque = self._slow.of(record.filled("output_torque"))
+            self.slow_torque = self.slow.of(record.filled("output_torque"))
         #: Of an arm; a torque sensor that is the load has it in its reading.
         self._arm = arm if plan.load != "output_torque" else None
         self.course = None if self._arm is None else arm_course(record, self._arm)
@@ -157,9 +155,10 @@ class Predictor:
         self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
 
     def disturbed(self, seed: int = 0) -> Predictor:
-        """The same record with the motion as another reading would have given it (parametric bootstrap).
+        """The same record as another reading would have given motion and load (parametric bootstrap).
 
-        What a prediction changes by is what the noise of the motion and of an arm's other joints does to it.
+        What a prediction changes by is what the noise of the motion, of an arm's other joints and of the load
+        does to it.
 
         Args:
             seed: of the draw.
@@ -168,6 +167,8 @@ class Predictor:
         found = self._moved(rng)
         if self._arm is not None:
             found.course = arm_course(self.record, self._arm, rng)
+        if self._load is not None:
+            found.load_torque = self._load.signal(LEAD_IN_S, rng)
         return found
 
     @cached_property
@@ -243,8 +244,12 @@ class Predictor:
         own = self._means.of(self._reading - self.motor_angle)
         return values - own / self.ratio, whole, *beside
 
-    def predict(self, candidate: Candidate) -> dict[str, Array]:
+    def predict(self, candidate: Candidate, also: Sequence[str] = ()) -> dict[str, Array]:
         """Every predicted channel at the record's times, shape (n,) each; with sensors as they read.
+
+        Args:
+            candidate: the model.
+            also: channels of the model that are returned as they are, by ``true_`` and their names.
 
         Raises:
             PredictionError: the model cannot be, or could not be integrated.
@@ -257,14 +262,14 @@ class Predictor:
         from hdsim.simulation.sample import sample
 
         load = candidate.load
-        parts: list[Any] = [*candidate.effects.values(), Gravity(load)]
+        weight, inertia = beside_readings(load, candidate.drive, sensed=self.slow is not None)
+        parts: list[Any] = [*candidate.effects.values(), *weight]
         if self.load_torque is not None:
             parts.append(SignalTorque(self.load_torque))
         elif load.torque is not None:
             # The scenario's load begins with the record, after the lead-in.
             late = LEAD_IN_S - self.record.begins_s
             parts.append(SignalTorque(SignalData(load.torque.data.move.delayed(late))))
-        inertia = load.inertia_kg_m2
         if self.course is not None:
             arm = self.course.part(load.arm, LEAD_IN_S)
             parts.append(arm)
@@ -298,24 +303,19 @@ class Predictor:
         for side in {"ring", "output"} & set(model.place_of):
             model.system.y0[model.place_of[side]] = self._zero
         self.runs += 1
-        asked = dict.fromkeys(self.plan.channels)
-        if self._slow is not None:
-            asked["output_torque"] = None
+        asked = dict.fromkeys((*self.plan.channels, "output_torque", *also))
         try:
             atol = self.rtol * model.seen_scale(CLOSER if self.whole else 1.0)
             got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol, atol=atol)
         except RunFailed as error:
             raise PredictionError(str(error)) from None
         found = {c: self._means.of(got.get(f"measured_{c}", got[c])) for c in self.plan.channels}
-        if self._slow is not None:
-            # Not compared, but it tells an effect that acts behind the sensor, where none can be seen.
-            found[CARRIED] = self._means.of(got["output_torque"])
-            if "output_torque" in found:
-                # What the sensor adds, and of that what a slow load could not be.
-                own = found["output_torque"] - found[CARRIED]
-                own = own - self._slow.of(own) if np.any(own) else own
-                found["output_torque"] = self.slow_torque + own
-        return found
+        if self.slow is not None and "output_torque" in found:
+            # What the sensor adds, and of that what a slow load could not be.
+            own = found["output_torque"] - self._means.of(got["output_torque"])
+            own = own - self.slow.of(own) if np.any(own) else own
+            found["output_torque"] = self.slow_torque + own
+        return found | {f"true_{name}": got[name] for name in also}
 
     def _motion(self, candidate: Candidate) -> SignalData:
         """The motor's motion, without the error that the candidate knows of the encoder it was read from."""

@@ -9,11 +9,6 @@ from running import Task, attempt
 
 @pytest.mark.slow
 @pytest.mark.study
-@pytest.mark.xfail(
-    raises=ValueError,
-    strict=True,
-    reason="since candidates are also fitted at other resonances a play is named beside the compliance",
-)
 def test_two_formulas_of_one_effect_are_one_name() -> None:
     """A compliance by another law: play and compliance each explain 98 %, and neither seemed needed."""
     line = attempt(Task("numpy", 8, 13))

@@ -223,6 +223,36 @@ def test_maxwell_obeys_masing(sharpness: float, tolerance: float) -> None:
     assert np.abs(branch_f - expected).max() < tolerance * 2.0
 
 
+@pytest.mark.parametrize(("count", "tolerance"), [(9, 0.02), (60, 0.003)])
+def test_maxwell_shares_that_grow_with_the_square_of_the_twist_are_rayleighs_law(
+    count: int, tolerance: float
+) -> None:
+    """Torque of the sliders at phi in proportion to phi dphi: a virgin curve W (2 u - u^2), u = x/phi_m.
+
+    In a geometric series of twists dphi is in proportion to phi. A parabola's loops, by Masing, are those of
+    Rayleigh 1887 (Philosophical Magazine 23:225): heat 4/3 nu x^3 in a cycle of amplitude x, nu = W/phi_m^2.
+    """
+    torque, last = 3.0, 0.8
+    # Each slider stands for the twists around it, the last one for those below it alone.
+    ratio = (last / 0.01) ** (1 / count) if count > 9 else math.sqrt(2.0)
+    twists = tuple(last * ratio ** -(k + 0.5) for k in range(count))
+    effect = TorsionalHysteresisMaxwell(slip_torque_nm=torque, slip_twists_mrad=twists, share_exponent=2.0)
+    amplitude = 0.6e-3
+    x, f = cycle(effect, amplitude)
+    u = x[:401] / (1e-3 * last)
+    assert np.abs(f[:401] - torque * (2 * u - u**2)).max() < tolerance * torque
+    heat = 4 / 3 * torque / (1e-3 * last) ** 2 * amplitude**3
+    assert abs(np.trapezoid(f[1600:], x[1600:])) == pytest.approx(heat, rel=2 * tolerance)
+
+
+def test_maxwell_shares_are_of_the_whole_slip_torque() -> None:
+    effect = TorsionalHysteresisMaxwell(slip_torque_nm=3.0, slip_twists_mrad=(0.1, 0.4), share_exponent=0.5)
+    small, large = effect.slip_elements()
+    assert small.slip_torque_nm + large.slip_torque_nm == pytest.approx(3.0, rel=1e-12)
+    assert large.slip_torque_nm / small.slip_torque_nm == pytest.approx(2.0, rel=1e-12)
+    assert large.slip_torque_nm / large.stiffness_nm_per_rad == pytest.approx(0.4e-3, rel=1e-12)
+
+
 def test_maxwell_default_stays_within_the_catalogues_hysteresis_loss() -> None:
     """Below 1 arcmin of width at zero torque over K1 = 1.6e4 N m/rad: 2 sum W < 4.65 N m."""
     x, f = cycle(TorsionalHysteresisMaxwell(), 2.1e-3)

@@ -82,3 +82,16 @@ def test_a_fit_with_too_much_damping_does_not_hide_the_noise():
         hear_motion(bench, states, bench.predict(damped))
         heard.append(output_of(bench).noise)
     assert heard[1] > 1.2 * heard[0]
+
+
+def test_the_noise_of_a_sensor_that_is_the_load_winds_the_spring_up():
+    """Encoders that resolve a hundredth of what the sensor's noise turns: all that is left is that noise."""
+    noise = {"motor_angle": 1e-6, "output_angle": 1e-8, "output_torque": 0.3}
+    bench = bench_for([noisy(hdsim.simulate(SCENARIO), noise, seed=4)], [], SCENARIO, "output_torque")
+    state = state_of(SCENARIO)
+    predictions = bench.predict(state)
+    series = output_of(bench)
+    rest = next(r for s, r in zip(bench.series, bench.residuals(predictions), strict=True) if s is series)
+    assert np.std(rest) > 30.0 * series.noise
+    hear_motion(bench, [state], predictions)
+    assert series.noise == pytest.approx(np.std(rest), rel=0.25)

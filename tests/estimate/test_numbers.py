@@ -52,6 +52,7 @@ UNITS = {
     "eccentricity_phase_deg": "deg",
     "eccentricity_um": "µm",
     "exponent": "",
+    "share_exponent": "",
     "extra_static_nm": "N m",
     "friction_nm": "N m",
     "gap_spread": "",

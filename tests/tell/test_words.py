@@ -67,6 +67,7 @@ EXPECTED = {
     "torsional_hysteresis_duhem.exponent": "",
     "torsional_hysteresis_duhem.saturation_torque_nm": "N m",
     "torsional_hysteresis_duhem.saturation_twist_mrad": "mrad",
+    "torsional_hysteresis_maxwell.share_exponent": "",
     "torsional_hysteresis_maxwell.slip_torque_nm": "N m",
     "torsional_hysteresis_maxwell.slip_twist_scale": "",
     "unbalance.motor_kg_m": "kg m",
