@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdsim.diagnosis.contest import LEFT_IN, Fitted, against_priors, confusable, contest
+from hdsim.diagnosis.contest import Fitted, against_priors, confusable, contest
 from hdsim.diagnosis.evidence import CandidateEvidence
 from hdsim.diagnosis.screen import Residual
 from hdsim.diagnosis.traces import Screened, Screening
@@ -95,9 +95,15 @@ class Named:
     alike: frozenset[str] = frozenset()
     instead_of: frozenset[str] = frozenset()
 
-    def look_alikes(self, bench: Bench) -> list[Fit]:
-        """The alternatives that look like it and leave not much more, those that leave least first."""
-        enough = LEFT_IN * bench.power(self.fit.predictions)
+    def look_alikes(self, bench: Bench, before: Fit) -> list[Fit]:
+        """The alternatives that look like it and explain nearly as much, those that leave least first.
+
+        Args:
+            bench: the measured series.
+            before: the model without any of them.
+        """
+        own = bench.power(self.fit.predictions)
+        enough = own + MISMATCH * (bench.power(before.predictions) - own)
         left = {name: bench.power(each.predictions) for name, each in self.alternatives.items()}
         near = [name for name in left if left[name] <= enough and confusable(self.name, name)]
         return [self.alternatives[name] for name in sorted(near, key=left.__getitem__)]

@@ -176,7 +176,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         # A base that carried nothing could tell nothing of its springs.
         current = together(bench, current, rough=True) if current.undetermined else current
         current = sharpened(bench, current)
-    own, rivals = current, named.look_alikes(bench)
+    own, rivals = current, named.look_alikes(bench, found.fit)
     current = refined(bench, base, own, partial(during, "fit"), rivals)
     if current.state.added[-1].effect != named.name:
         named.gives_way(bench, found.fit, own, current)

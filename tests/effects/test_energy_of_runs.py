@@ -35,6 +35,8 @@ def sized(
     if known.plausible is None or (data is None and rng.random() < 0.5):
         return data
     low, high = known.plausible.times(scales)
+    if low < 0:  # an exponent
+        return float(rng.uniform(max(low * BEYOND, known.least), min(high * BEYOND, known.most)))
     low, high = max(low / BEYOND, known.least), min(high * BEYOND, 0.999 * known.most)
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
