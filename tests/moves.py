@@ -7,6 +7,15 @@ from typing import Any
 NOISE = {"motor_angle": 3e-5, "output_angle": 4e-6, "motor_torque": 3e-3}
 
 
+#: A load's torque that swells and ebbs: loops in loops.
+SWELL: dict[str, Any] = {
+    "type": "multisine",
+    "amplitude_nm": 30.0,
+    "frequencies_hz": [0.25, 0.6],
+    "phases_deg": [0.0, 0.0],
+}
+
+
 def positioned(trajectory: dict[str, Any], *, position_gain_per_s: float = 30.0) -> dict[str, Any]:
     """A command that moves the output of a drive of size 20 along a trajectory."""
     return {"motor": {

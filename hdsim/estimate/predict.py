@@ -303,7 +303,7 @@ class Predictor:
         for side in {"ring", "output"} & set(model.place_of):
             model.system.y0[model.place_of[side]] = self._zero
         self.runs += 1
-        asked = dict.fromkeys((*self.plan.channels, "output_torque", *also))
+        asked = dict.fromkeys((*self.plan.channels, *also))
         try:
             atol = self.rtol * model.seen_scale(CLOSER if self.whole else 1.0)
             got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol, atol=atol)

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from moves import positioned, to_and_fro
+from moves import SWELL, positioned, to_and_fro
 from noisy import noisy
 
 import hdsim
@@ -44,12 +44,7 @@ def scenario(motion: str, effects: dict[str, Any] | None = None) -> Scenario:
         "command": positioned(trajectory),
         "load": {
             "inertia_kg_m2": inertia,
-            "torque": {
-                "type": "multisine",
-                "amplitude_nm": 30.0,
-                "frequencies_hz": [0.25, 0.6],
-                "phases_deg": [0.0, 0.0],
-            },
+            "torque": SWELL,
         },
         "run": {"duration_s": 6.0, "sample_rate_hz": 500.0},
     })  # fmt: skip

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from diagnose_bench import beyond, with_effects
-from moves import positioned
+from moves import SWELL, positioned
 from noisy import noisy
 
 import hdsim
@@ -32,12 +32,7 @@ def scenario(effects: dict[str, Any]) -> Scenario:
         "command": positioned({"type": "sine", "amplitude_deg": 2.0, "frequency_hz": 0.1}),
         "load": {
             "inertia_kg_m2": 0.05,
-            "torque": {
-                "type": "multisine",
-                "amplitude_nm": 30.0,
-                "frequencies_hz": [0.25, 0.6],
-                "phases_deg": [0.0, 0.0],
-            },
+            "torque": SWELL,
         },
         "run": {"duration_s": 12.0, "sample_rate_hz": 200.0},
     })  # fmt: skip
