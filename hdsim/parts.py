@@ -200,6 +200,9 @@ class Builder(Protocol):
             InputError: the mesh has teeth, each with a gap of its own.
         """
 
+    def fill_gap(self, share: float) -> None:
+        """Let a share of the drive's damper be that of the grease between the flanks, in the gap, too."""
+
     def grow_gaps(self, growth: float) -> None:
         """Widen each tooth's own half-gap by a part of itself; a mesh without teeth has none."""
 

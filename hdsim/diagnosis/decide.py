@@ -141,12 +141,14 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     """Each piece of evidence on an effect: what it is, what was seen, its weight in log odds."""
     law = evidence.laws[k]
     # Each is asked what held-out data show of its own. A later one that is no line is bent to what is left,
-    # and so to much of what is left elsewhere: for it they only speak against.
+    # and so to much of what is left elsewhere: for it they speak where all of them show it alike.
     held_out = law.held if law.held is not None else evidence.held
     held = rules.held * _held(held_out, rules)
     # A sharp line that data hold which no step has seen is none that the search has chosen of many.
-    line = law.sharp and _repeats(held_out, rules)
+    line = law.sharp and _repeats(held_out, rules.repeats, rules)
     repeats = line and law.held is not None
+    # A law that is bent to what is another's is there in some blocks of time, in others not.
+    steady = law.held is not None and _repeats(held_out, rules.steady, rules)
     # What is left elsewhere than in its own coordinate is another effect's, and counts half; whole where all
     # names together explain less than they leave: they may well be bent to a part of what has no name.
     seen = _log_odds(evidence.explained)
@@ -163,7 +165,7 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
         (
             "held-out data show the promised change",
             held_out.slope,
-            min(held, 0.0) if k and not repeats else held,
+            min(held, 0.0) if k and not (repeats or steady) else held,
         ),
         ("resampled records that it wins", law.sampled, rules.sampled * _log_odds(law.sampled)),
     ]
@@ -192,9 +194,9 @@ def weighed(evidence: Evidence, k: int, rules: Rules) -> list[tuple[str, float, 
     return found
 
 
-def _repeats(held: HeldOutEvidence, rules: Rules) -> bool:
-    """Whether held-out data show a change by itself beyond chance, and nearly all of it."""
-    return held.slope > 1.0 - rules.held_mismatch and held.slope > rules.repeats * held.spread
+def _repeats(held: HeldOutEvidence, times: float, rules: Rules) -> bool:
+    """Whether held-out data show nearly all of a change by itself, ``times`` its standard error."""
+    return held.slope > 1.0 - rules.held_mismatch and held.slope > times * held.spread
 
 
 def _held(held: HeldOutEvidence, rules: Rules) -> float:

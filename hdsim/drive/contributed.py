@@ -38,6 +38,7 @@ class Contributions:
     half_gap_rad: float = 0.0
     gap_waves: list[float] = field(default_factory=list)
     gap_growth: float = 0.0
+    film_share: float = 0.0
     odd_teeth: list[OddTooth] = field(default_factory=list)
     play: bool = False
 
@@ -101,6 +102,10 @@ class Contributed:
     def wave_of_gap(self, amplitude_rad: float, by_motor: float, by_output: float, phase_rad: float) -> None:
         """Let the gap go round with the angles; see ``hdsim.parts.Builder.wave_of_gap``."""
         self._given.gap_waves += [amplitude_rad, by_motor, by_output, phase_rad]
+
+    def fill_gap(self, share: float) -> None:
+        """Let a share of the damper act in the gap, too; see ``hdsim.parts.Builder.fill_gap``."""
+        self._given.film_share = max(self._given.film_share, share)
 
     def grow_gaps(self, growth: float) -> None:
         """Add to the growth of the gaps; see ``hdsim.parts.Builder.grow_gaps``."""

@@ -79,7 +79,7 @@ class Model(Contributed):
         self.teeth: Teeth | None = None
         # The signals' columns follow the own states, whose number is known only after a first pass; so is the
         # friction of all parts.
-        self._has_play = False
+        self._has_play, self._film_share = False, 0.0
         for _ in range(2):
             self._given = Contributions()
             self.motion_columns = {name: self.signal(motion) for name, motion in self.motions.items()}
@@ -88,6 +88,7 @@ class Model(Contributed):
                 part.contribute(self)
             given = self._given
             self._has_play = given.play or given.half_gap_rad > 0.0 or bool(given.gap_waves)
+            self._film_share = given.film_share
             self._own_before = len(self._given.states)
             self._names = {state.name: OWN + k for k, state in enumerate(self._given.states)}
             self.input_frictions = tuple(self._given.input_frictions)
@@ -120,7 +121,10 @@ class Model(Contributed):
             # A ring of its own has its own twist; else damper and play are in series, but share one twist.
             free_play = isinstance(mesh, TeethMesh | TabulatedMesh) or self._has_play
             kernel = friction.contact_damping if free_play and not self.has_ring else friction.torsion_damping
-            self.element(kernel, [damping])
+            if self._film_share < 1.0:
+                self.element(kernel, [(1.0 - self._film_share) * damping])
+            if self._film_share > 0.0:
+                self.element(friction.mesh_damping, [self._film_share * damping])
         if isinstance(mesh, TeethMesh | TabulatedMesh) and mesh.damping_nm_s_per_rad > 0:
             self.element(friction.mesh_damping, [mesh.damping_nm_s_per_rad])
 

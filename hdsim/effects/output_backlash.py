@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 #: Widths of the play that are tried, as parts of the twist that a record covers.
 _PARTS = (0.05, 0.05 * WIDER, 0.05 * WIDER**2)
 
+#: A play in its finer formulas.
+_PLAY = Amplitude({"backlash_arcmin": 0.1}, of_range="twist_arcmin", play=True)
+
 
 class PlayComponent(Parameters):
     """One harmonic of a play that is not the same all round."""
@@ -45,6 +48,9 @@ class OutputBacklash(Effect):
     (1 + s) b/2. Beyond the first the torque grows with the square of the twist, until at the uptake torque T
     the last tooth bears: a gap of (1 - s) b/2 and, in series with the torsion spring,
     d = s b/2 (2 u - u^2) with u = sqrt(min(|tau|/T, 1)). The springs of all teeth together are the drive's.
+
+    Nothing damps the gap unless a share f of the drive's damper c is that of the grease between the flanks:
+    -f c dDelta/dt acts in the gap, too, and the rest where flanks touch.
 
     With components the half-gap goes round, b/2 + sum A sin(order * angle + phase), nowhere below zero: which
     teeth engage changes with the wave generator's angle. One potential gives all torques.
@@ -88,22 +94,27 @@ class OutputBacklash(Effect):
         ),
     )
 
-    finer: ClassVar[tuple[Fitting, ...]] = tuple(
+    finer: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
-            (
-                Amplitude({"backlash_arcmin": 0.1}, of_range="twist_arcmin", play=True),
-                *Harmonic.components("amplitude_arcmin", 0.02, len(orders)),
-            ),
-            (
-                Shape("uptake_torque_nm", (0.03, 0.2), of_range="torque_nm", most=1.0),
-                Shape("gap_spread", (0.4, 0.9), linear=True),
-            ),
-            settings={"components": [{"order": order, "amplitude_arcmin": 0.0} for order in orders]},
-            label=label,
-            turns=1.0 if orders else 0.0,
+            (_PLAY,),
+            (Shape("film_share", (0.5, 1.0), linear=True),),
+            label="with grease in its gap",
             mesh="toothless",
-        )
-        for label, orders in (("of many teeth", (2, 4)), ("of gaps that differ", ()))
+        ),
+        *(
+            Fitting(
+                (_PLAY, *Harmonic.components("amplitude_arcmin", 0.02, len(orders))),
+                (
+                    Shape("uptake_torque_nm", (0.03, 0.2), of_range="torque_nm", most=1.0),
+                    Shape("gap_spread", (0.4, 0.9), linear=True),
+                ),
+                settings={"components": [{"order": order, "amplitude_arcmin": 0.0} for order in orders]},
+                label=label,
+                turns=1.0 if orders else 0.0,
+                mesh="toothless",
+            )
+            for label, orders in (("of many teeth", (2, 4)), ("of gaps that differ", ()))
+        ),
     )
 
     # Ten degrees: no gear.
@@ -125,6 +136,10 @@ class OutputBacklash(Effect):
         Plausible(0.005, 1.0, "estimate: less than the rated torque", of="rated_torque"),
     ] = Field(None, gt=0)
     """Torque at which the last tooth bears, N m; needed with a spread."""
+    film_share: Annotated[float, Plausible(0.05, 1.0, "from a trace of oil to a gap full of grease")] = Field(
+        0.0, ge=0, le=1
+    )
+    """Share f of the drive's damper that is the grease's between the flanks, and acts in the gap, too."""
     components: tuple[PlayComponent, ...] = Field((), max_length=8)
     """Harmonics of the play around the wave generator; of a lumped mesh only."""
 
@@ -142,6 +157,7 @@ class OutputBacklash(Effect):
         for wave in self.components:
             phase = math.radians(wave.phase_deg)
             build.wave_of_gap(wave.amplitude_arcmin * ARCMIN, *factors(wave.order, wave.per), phase)
+        build.fill_gap(self.film_share)
         if coefficient is not None:
 
             def gradual(torque: Array) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from hdsim.effects._fitting import Ranged
 from hdsim.estimate.found import ParameterEstimate
 from hdsim.estimate.numbers import Free
 from hdsim.estimate.records import Array
@@ -94,7 +95,7 @@ def _lists(state: State, name: str) -> dict[str, Any]:
 
 
 def fitted_numbers(added: Added, covariance: Array, deviations: Array) -> dict[str, ParameterEstimate]:
-    """An effect's fitted fields with 95 % intervals.
+    """An effect's fitted fields with 95 % intervals, within what each field can be.
 
     Args:
         added: the fitted effect.
@@ -103,11 +104,14 @@ def fitted_numbers(added: Added, covariance: Array, deviations: Array) -> dict[s
     """
     found = added.fitting.report(added.coefficients, covariance, added.shapes, deviations, added.orders)
     return {
-        path: ParameterEstimate(
-            value=one.value, interval=None if math.isnan(one.low) else (one.low, one.high)
-        )
+        path: ParameterEstimate(value=one.value, interval=_possible(one, *added.limits(path)))
         for path, one in found.items()
     }
+
+
+def _possible(one: Ranged, least: float, most: float) -> tuple[float, float] | None:
+    """An interval, without what the field cannot be."""
+    return None if math.isnan(one.low) else (max(one.low, least), min(one.high, most))
 
 
 def _rounded(value: float) -> float:

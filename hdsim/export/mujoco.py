@@ -117,7 +117,7 @@ def mjcf(scenario: Scenario, *, weigh: bool = False) -> tuple[str, tuple[Lost, .
             for number, (band, stiffness) in enumerate(spring.bands, 1)
         )
         coupling += "</tendon>"
-        if spring.half_gap_rad and drive.torsion.damping_nm_s_per_rad:
+        if spring.half_gap_rad and drive.torsion.damping_nm_s_per_rad and spring.film_share < 1.0:
             lost.append(Lost("damping in contact only", "damping within the play, too"))
     command = scenario.command.motor
     if not isinstance(command, TorqueCommand | FreeCommand):

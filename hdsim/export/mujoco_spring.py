@@ -33,6 +33,7 @@ class Probe(Contributed):
         self.frictions = self._given.input_frictions
         given = self._given
         self.only_spring = not (given.elements or given.twists or given.sensors or given.gap_waves)
+        self.film_share = given.film_share
         self.only_friction = len(self._given.elements) == len(self.frictions) == 1 and not self._given.twists
 
 
@@ -43,10 +44,12 @@ class Spring:
     Args:
         bands: half width b of a dead band, rad, and stiffness k that acts beyond it, N m/rad; growing b.
         error: largest deviation from hdsim's torque up to twice rated torque, over rated torque.
+        film_share: share of the damper that acts within the play, too.
     """
 
     bands: tuple[tuple[float, float], ...]
     error: float
+    film_share: float
 
     @property
     def half_gap_rad(self) -> float:
@@ -98,7 +101,9 @@ def straight_spring(scenario: Scenario) -> Spring:
     slopes = np.diff(torques[corners]) / np.diff(twists[corners])
     changes = np.diff(slopes, prepend=0.0)
     bands = zip(twists[corners[:-1]].tolist(), changes.tolist(), strict=True)
-    return Spring(tuple(bands), float(off.max()))
+    active = scenario.effects.active().values()
+    film_share = max((Probe(scenario, effect).film_share for effect in active), default=0.0)
+    return Spring(tuple(bands), float(off.max()), film_share)
 
 
 def _springs(scenario: Scenario) -> dict[str, Effect]:

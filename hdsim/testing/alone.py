@@ -69,6 +69,7 @@ class Collector:
         self.half_gap = 0.0
         self.gap_waves: list[tuple[float, float, float, float]] = []
         self.gap_growth = 0.0
+        self.film_share = 0.0
         self.odd_teeth: list[OddTooth] = []
         self.moving_housing: tuple[int, float] | None = None
         self.sensors: dict[str, Any] = {}
@@ -116,6 +117,10 @@ class Collector:
     def wave_of_gap(self, amplitude_rad: float, by_motor: float, by_output: float, phase_rad: float) -> None:
         """See ``hdsim.parts.Builder.wave_of_gap``."""
         self.gap_waves.append((amplitude_rad, by_motor, by_output, phase_rad))
+
+    def fill_gap(self, share: float) -> None:
+        """See ``hdsim.parts.Builder.fill_gap``."""
+        self.film_share = max(self.film_share, share)
 
     def grow_gaps(self, growth: float) -> None:
         """See ``hdsim.parts.Builder.grow_gaps``."""

@@ -95,6 +95,20 @@ def test_a_log_that_is_too_slow_for_its_motion_is_told_from_one_that_is_not():
     assert unresolved(slow, {}) < 0.3 < 1.0 < unresolved(slow, ripple)
 
 
+def test_a_plants_damper_bridges_its_play_as_grease_in_the_gap_does(compared):
+    """A load that swings through its play: nearly all that damps it is what acts in the gap."""
+    setup = setup_of(2, motion="chirp", sensors="torque sensor", gravity=False, rate=2000, noise=0.5)
+    changes = {"gap": 2.5e-4, "gap_rounding": 0.0}
+    backlash = catalogue()["output_backlash"]
+    size = {"backlash_arcmin": np.degrees(changes["gap"]) * 60.0}
+    dry, greased = (
+        compared(setup, changes, {"output_backlash": backlash(**size, film_share=share)}) for share in (0, 1)
+    )
+    # The zero between the encoders, which the play turns, is estimated from the log.
+    assert max(greased.values()) < 0.3
+    assert dry["output_angle"] > 3.0
+
+
 def test_a_plant_without_losses_conserves_energy():
     """What the motor puts in is kinetic, elastic and potential energy, whatever the kinematic error does."""
     setup = setup_of(1, motion="swing")

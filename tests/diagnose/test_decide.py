@@ -177,6 +177,14 @@ def test_a_later_effect_whose_own_change_held_out_data_do_not_show_is_not_named(
     assert confidence(absent) < 0.5 < confidence(there)
 
 
+@pytest.mark.parametrize(("spread", "names"), [(0.008, [0, 1]), (0.1, [0])])
+def test_held_out_data_speak_for_a_later_law_where_all_of_them_show_it(spread, names):
+    """A weak thermal friction beside an encoder's error: three quarters of what the torque lacks."""
+    held = HeldOutEvidence(slope=1.04, spread=spread)
+    evidence = found(law("sensors"), law("thermal_friction", needed=0.74, held=held))
+    assert decide(evidence).names == names
+
+
 def test_a_model_that_predicts_held_out_data_worse_than_the_one_as_given_has_no_names():
     """An effect may take back what the re-fit had bent, and no more."""
     taken_back = HeldOutEvidence(slope=0.65, spread=0.03)

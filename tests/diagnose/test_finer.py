@@ -88,6 +88,17 @@ def test_a_sharp_play_stays_as_it_is() -> None:
 
 
 @pytest.mark.slow
+def test_of_a_play_full_of_grease_the_damper_acts_in_the_gap() -> None:
+    bench, base, plain = with_play(LUMPED, {PLAY: {"backlash_arcmin": 1.0, "film_share": 1.0}})
+    found = refined(bench, base, plain, lambda _: None)
+    assert beyond(bench, plain) > 1.0
+    assert beyond(bench, found) < 0.1
+    own = found.state.added[0].settings()
+    assert own["film_share"] == pytest.approx(1.0, abs=0.1)
+    assert own["backlash_arcmin"] == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.slow
 def test_gaps_that_differ_are_told_where_their_waves_are_none() -> None:
     gaps = {"backlash_arcmin": 1.2, "gap_spread": 0.9, "uptake_torque_nm": 8.0}
     bench, base, plain = with_play(LUMPED, {PLAY: gaps}, label="taken up gradually")
@@ -101,9 +112,9 @@ def test_gaps_that_differ_are_told_where_their_waves_are_none() -> None:
 @pytest.mark.slow
 def test_gaps_that_differ_are_asked_from_where_many_teeth_end(monkeypatch: pytest.MonkeyPatch) -> None:
     def stuck(bench: Bench, ways: Sequence[tuple[Fit, list[Added]]]) -> list[Fit]:
-        """Where several begin, the formula with fewer numbers comes to nothing."""
-        ends = to_their_ends(bench, ways)
-        return [end for end in ends if len(ways) == 1 or end.state.added[-1].fitting.turns]
+        """Where one with waves begins, too, the formulas with fewer numbers come to nothing."""
+        ends, waves = to_their_ends(bench, ways), any(added[-1].fitting.turns for _, added in ways)
+        return [end for end in ends if not waves or end.state.added[-1].fitting.turns]
 
     to_their_ends = finer._at_their_ends
     monkeypatch.setattr(finer, "_at_their_ends", stuck)

@@ -306,3 +306,11 @@ def test_a_number_known_no_better_than_before_is_not_determined(tmp_path):
     assert not one.determined
     assert math.isnan(one.low)
     assert not one.moved
+
+
+def test_an_interval_ends_where_its_field_does():
+    backlash = catalogue()["output_backlash"]
+    fitting = next(f for f in backlash.finer if any(shape.path == "film_share" for shape in f.shapes))
+    added = Added("output_backlash", fitting, (1.0,), (0.9,), ())
+    interval = fitted_numbers(added, np.eye(1), np.array([5.0]))["film_share"].interval
+    assert interval == (0.0, 1.0)

@@ -136,6 +136,37 @@ def test_inside_the_gap_there_is_no_torque_and_nothing_pulls(
     assert np.min(np.diff(found["heat"])) >= -1e-7 * found["heat"][-1]
 
 
+@pytest.mark.parametrize("mesh", [{"model": "lumped"}, {"ring": "static"}], ids=["lumped", "static"])
+@pytest.mark.parametrize("share", [0.25, 1.0])
+def test_in_a_gap_full_of_grease_a_load_moves_as_on_a_dashpot(mesh: dict[str, Any], share: float) -> None:
+    """J dw/dt = T - f c w beside a motor that is held: w = T/(f c) (1 - exp(-f c t/J))."""
+    inertia, torque, damping = 0.5, 0.05, 8.0
+    found = build_run(
+        Scenario.model_validate(
+            {
+                "drive": {
+                    "preset": "seed-2021",
+                    "mesh": mesh,
+                    "torsion": {"damping_nm_s_per_rad": damping},
+                },
+                "effects": {"output_backlash": {"backlash_arcmin": 60.0, "film_share": share}},
+                "command": {"motor": {"type": "motion", "trajectory": {"type": "hold", "angle_deg": 0}}},
+                "load": {
+                    "inertia_kg_m2": inertia, "torque": {"type": "hold", "torque_nm": torque},
+                },
+                "run": {"duration_s": 0.5, "sample_rate_hz": 1000, "rtol": 1e-8},
+            }
+        )
+    ).record()  # fmt: skip
+    rate = share * damping / inertia
+    time = found.time
+    expected = torque / (share * damping) * (time + np.expm1(-rate * time) / rate)
+    assert np.max(expected) < 0.9 * 30 * 60 * ARCSEC  # in the gap
+    np.testing.assert_allclose(np.abs(found["output_angle"]), expected, atol=1e-5 * np.max(expected))
+    heat = share * damping * np.trapezoid(np.gradient(expected, time) ** 2, time)
+    assert found["heat"][-1] == pytest.approx(heat, rel=1e-3)
+
+
 def test_the_damper_in_contact_obeys_the_second_law_whatever_its_numbers() -> None:
     rng = np.random.default_rng(1)
     for _ in range(2000):
@@ -156,11 +187,13 @@ def test_the_jacobian_is_exact_with_play_and_damping(mesh: dict[str, Any], arran
         Scenario.model_validate(
             {
                 "drive": {"preset": "seed-2021", "arrangement": arrangement, "mesh": mesh},
-                "effects": {"output_backlash": {"backlash_arcmin": 1.0}, "kinematic_error": {}},
+                "effects": {
+                    "output_backlash": {"backlash_arcmin": 1.0, "film_share": 0.4}, "kinematic_error": {},
+                },
                 "load": {"inertia_kg_m2": 0.5},
                 "command": {"motor": {"type": "free"}},
                 "run": {"duration_s": 1.0},
             }
         )
-    )
+    )  # fmt: skip
     check(model.system)

@@ -56,6 +56,7 @@ UNITS = {
     "extra_static_nm": "N m",
     "friction_nm": "N m",
     "gap_spread": "",
+    "film_share": "",
     "heat_capacity_j_per_k": "J/K",
     "growth": "",
     "interference_arcmin": "arcmin",

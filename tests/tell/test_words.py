@@ -41,6 +41,7 @@ EXPECTED = {
     "output_backlash.components.amplitude_arcmin": "arcmin",
     "output_backlash.components.phase_deg": "deg",
     "output_backlash.gap_spread": "",
+    "output_backlash.film_share": "",
     "output_backlash.uptake_torque_nm": "N m",
     "output_backlash.coefficient_per_nm": "1/(N m)",
     "output_eccentricity.eccentricity_um": "µm",
