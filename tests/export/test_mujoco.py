@@ -60,6 +60,23 @@ def test_what_the_format_can_say_has_the_torque_of_the_run() -> None:
     assert torque_deviation(scenario(), callback=False) < 0.05
 
 
+def test_a_play_full_of_grease_is_mujocos_tendon_with_a_dead_band() -> None:
+    """Another simulator, whose damper bridges the dead band."""
+
+    def worn(share: float) -> Scenario:
+        play = {"backlash_arcmin": 20.0, "film_share": share}
+        damped = {"damping_nm_s_per_rad": 20.0}
+        return scenario({"output_backlash": play}, friction=STEADY, torsion=damped)
+
+    def lost(share: float) -> bool:
+        return any("damping" in each.what for each in mjcf(worn(share))[1])
+
+    assert torque_deviation(worn(1.0), callback=False) < 0.005
+    assert torque_deviation(worn(0.0), callback=False) > 0.1
+    assert lost(0.0)
+    assert not lost(1.0)
+
+
 def test_the_callback_brings_the_rest_back() -> None:
     assert torque_deviation(scenario(friction=STEADY), callback=True) < 0.002
     one = scenario({"kinematic_error": {}, "torsional_hysteresis_maxwell": {}})
