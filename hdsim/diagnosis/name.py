@@ -161,6 +161,12 @@ def name_effect(
         return ALIKE if lives or confusable(best.name, name) else NEAR
 
     shortlist = [one for one in screening.ranked if one.share.share >= near(one.name) * best.share.share]
+    # A trace of which the base explains nearly all is told by what its simulation is not linear in.
+    shortlist += [
+        one
+        for one in screening.ranked
+        if one not in shortlist and confusable(best.name, one.name) and not one.added.fitting.shapes
+    ]
     shortlist = [one for one in shortlist if _could_win(one, best)][:SHORTLIST]
     softer = [free.none / free.prior for free in at_present(base) if free.compliance and free.none > SOFTER]
     series = [one for one in screening.ranked if one.added.fitting.in_series]

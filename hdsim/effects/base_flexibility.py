@@ -32,6 +32,14 @@ def mounted_housing(
     outputs[STORED] += 0.5 * (parameters[0] * angle * angle + parameters[2] * speed * speed)
 
 
+_COMPLIANCE = Inverse("stiffness_nm_per_rad", 5.0e5)
+_RINGING = Fitting(
+    (_COMPLIANCE,),
+    (Shape("natural_frequency_hz", (20.0, 45.0, 100.0, 225.0), least=5.0, most=500.0),),
+    label="with housing inertia",
+)
+
+
 class BaseFlexibility(Effect):
     """J_b b'' = -(1 - 1/i) tau - K_b b - d b', twist + (1 - 1/i) b; without inertia (1 - 1/i)^2 tau / K_b.
 
@@ -58,14 +66,8 @@ class BaseFlexibility(Effect):
             " scatters by 30 %)",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting((Inverse("stiffness_nm_per_rad", 5.0e5),)),
-        Fitting(
-            (Inverse("stiffness_nm_per_rad", 5.0e5),),
-            (Shape("natural_frequency_hz", (20.0, 45.0, 100.0, 225.0), least=5.0, most=500.0),),
-            label="with housing inertia",
-        ),
-    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting((_COMPLIANCE,)), _RINGING)
+    finer: ClassVar[tuple[Fitting, ...]] = (_RINGING,)
 
     stiffness_nm_per_rad: Annotated[
         float, Plausible(2.0, 300.0, "estimate: a mount is stiffer than the drive", of="stiffness_k1")

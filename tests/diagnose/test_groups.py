@@ -16,10 +16,10 @@ def left_in_the_first(power):
     return np.array([power, *np.ones(19)])
 
 
-def effect(name):
-    fitting = SimpleNamespace(in_series=False, play=False, shapes=(), label="")
+def effect(name, share=0.5, shapes=()):
+    fitting = SimpleNamespace(in_series=False, play=False, shapes=shapes, label="")
     added = SimpleNamespace(effect=name, fitting=fitting, freedom=2, at_limit=False)
-    return SimpleNamespace(name=name, share=SimpleNamespace(share=0.5), added=added)
+    return SimpleNamespace(name=name, share=SimpleNamespace(share=share), added=added)
 
 
 @pytest.mark.parametrize(("left", "alike"), [(400.0, True), (600.0, False), (850.0, False)])
@@ -49,3 +49,20 @@ def test_another_name_explains_at_least_half_of_what_the_best_does(monkeypatch, 
     found = name_effect(bench, base, screening, None)
     assert found.name == best.name
     assert list(found.group) == ([other.name] if alike else [])
+
+
+def test_what_looks_like_the_screens_best_is_fitted_whatever_its_own_trace_explains(monkeypatch):
+    """The base explains nearly all of an unbalance's trace, and what is left of it is the simulation's."""
+    best, alike = effect("output_eccentricity"), effect("unbalance", -0.0002)
+    other, bent = effect("thermal_friction", 0.01), effect("kinematic_error", 0.01, shapes=("phase",))
+    asked = []
+
+    def contest(bench, base, shortlist, *_):
+        asked.extend(one.name for one in shortlist)
+        return []
+
+    monkeypatch.setattr("hdsim.diagnosis.name.contest", contest)
+    screening = SimpleNamespace(ranked=[best, other, bent, alike], chance=0.005)
+    base = SimpleNamespace(frees=[], theta=[])
+    assert name_effect(SimpleNamespace(coarse=contextlib.nullcontext), base, screening, None) is None
+    assert asked == [best.name, alike.name]

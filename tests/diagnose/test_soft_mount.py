@@ -3,15 +3,18 @@
 from typing import Any
 
 import pytest
-from diagnose_bench import with_stiffness
+from diagnose_bench import with_effects, with_stiffness
 from moves import NOISE, positioned, to_and_fro
 from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis.again import left_of
+from hdsim.diagnosis.finer import refined
 from hdsim.diagnosis.name import name_effect
+from hdsim.diagnosis.starts import starts
 from hdsim.diagnosis.traces import screen
 from hdsim.diagnosis.workflow import diagnose
+from hdsim.effects import catalogue
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import refit
@@ -60,6 +63,23 @@ def test_a_mount_softer_than_the_drive_is_named(moved: tuple[float, float, dict[
     assert bench.power(named.fit.predictions) < 1.05 * bench.noise_power
     mount = named.fit.state.added[-1].settings()["stiffness_nm_per_rad"]
     assert mount == pytest.approx(MOUNT, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rings", [True, False])
+def test_a_mount_that_has_its_name_rings_where_the_data_tell_it(rings: bool) -> None:
+    """An effect once named is asked for its housing's inertia, of which a contest of all says too little."""
+    truth = {"stiffness_nm_per_rad": 5e4} | ({"natural_frequency_hz": 25.0} if rings else {})
+    run = hdsim.simulate(arm(*LIGHT, {"base_flexibility": truth}))
+    base = arm(*LIGHT, {})
+    bench = bench_for([noisy(run, NOISE, seed=1)], [], base, None)
+    found = refit(bench, state_of(base)).fit
+    way = catalogue()["base_flexibility"].fittings[0]
+    plain = with_effects(bench, found, *starts("base_flexibility", way, (), bench.ranges(found.state)))
+    own = refined(bench, found, plain, lambda _: None).state.added[0]
+    assert own.fitting.label == ("with housing inertia" if rings else "")
+    if rings:
+        assert own.settings()["natural_frequency_hz"] == pytest.approx(25.0, rel=0.03)
 
 
 @pytest.mark.slow
