@@ -190,10 +190,11 @@ def without(bench: Bench, current: Fit, k: int) -> Fit | None:
         current: the model with it.
         k: which of its effects.
     """
-    gone = gone_with(current, k)
+    gone, sizes = gone_with(current, k), current.state.added[k].coefficients
     known = gone.columns, math.nan
+    lost = -current.columns[:, current.numbers_of(k)][:, : len(sizes)] @ np.array(sizes)
     try:
-        return fit(bench, gone.state, gone.frees, prune=False, after=gone, known=known, rough=True)
+        return fit(bench, gone.state, gone.frees, prune=False, after=gone, known=known, lost=lost, rough=True)
     except (PredictionError, np.linalg.LinAlgError):
         return None
 

@@ -10,6 +10,7 @@ Econometrics 232:272), and the fit weighs the data by the number of independent 
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from hdsim.estimate.covariance import robust_covariance, sample_power
 from hdsim.estimate.determine import determined
 from hdsim.estimate.minimise import EVALUATIONS, minimised
 from hdsim.estimate.numbers import REACH, Free, Interval, scaled
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State
 from hdsim.estimate.vector import Measured, Vector, sensitivities
@@ -88,6 +90,7 @@ def fit(
     theta: Mapping[str, float] | None = None,
     after: Fit | None = None,
     known: tuple[Array, float] | None = None,
+    lost: Array | None = None,
     rough: bool = False,
 ) -> Fit:
     """Fit a model to the training data.
@@ -104,6 +107,8 @@ def fit(
         after: an earlier fit whose undetermined numbers stay so, and widen the intervals of this one's.
         known: sensitivities near the start to the first numbers, shape (rows, up to p), and what one
             independent sample of the residual will count (or nan), where they are known.
+        lost: change of the predictions, whitened, shape (rows,), by what the model no longer has: with
+            ``known`` the fit begins where the others make up for it, if that leaves less.
         rough: the covariance is not needed, nor the sensitivities at the end.
 
     Raises:
@@ -146,6 +151,8 @@ def fit(
         lower, upper = problem.bounds
         x0 = x0 + np.concatenate([np.zeros(len(chosen)), moves[len(chosen) :]])
         x0 = np.clip(x0, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+    if lost is not None and known is not None:
+        x0 = _made_up(problem, x0, known[0], lost)
     predictions = problem.predicted(x0)
     start = problem.residual(x0)
     if len(x0) == 0:
@@ -182,6 +189,22 @@ def _standing_in(columns: Array, priors: Array, change: Array) -> Array:
     """
     moves, *_ = np.linalg.lstsq(columns * priors, -change, rcond=1e-3)
     return np.asarray(np.clip(moves * priors, -REACH, REACH) if len(priors) else moves)
+
+
+def _made_up(problem: Measured, x0: Array, columns: Array, lost: Array) -> Array:
+    """Where the numbers stand in for what the model has lost, or where they were, whichever leaves less.
+
+    What an effect and one of the base's numbers do together may be far less than what either does, and no
+    slope leads back from where one of them is gone.
+    """
+    moves, own = _standing_in(columns, problem.priors, lost), len(problem.vector.frees)
+    moves[:own] /= problem.vector.rates(x0)
+    lower, upper = problem.bounds
+    there = np.clip(x0 + moves, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+    with contextlib.suppress(PredictionError):
+        here, new = (problem.residual(x) for x in (x0, there))
+        return there if float(new @ new) < float(here @ here) else x0
+    return x0
 
 
 def settled(bench: Bench, found: Fit) -> Fit:

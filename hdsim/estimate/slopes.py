@@ -62,13 +62,15 @@ class Slopes:
         most = np.abs(problem.steps(x))
         steps = [d * float(np.min(most / np.maximum(np.abs(d), 1e-300))) for d in weak]
         changes = problem.changes([(x - d, x + d) for d in steps])
+        # What a column may be wrong by: a part of itself, and a change that is just heard over its step.
+        wrong = (WEAK * lengths) ** 2 + len(columns) * (HEARD / most) ** 2
         for d, change in zip(steps, changes, strict=True):
             if change is None:
                 continue
             change = 0.5 * change
             if math.sqrt(np.mean(change**2)) < HEARD:
                 change = np.zeros_like(change)
-            along = d * lengths**2
+            along = d * wrong
             columns = columns + np.outer(change - columns @ d, along / (d @ along))
         self._columns = columns
         return columns

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from rig import model, record
 
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import fit
+from hdsim.estimate.fit import _made_up, fit
 from hdsim.estimate.numbers import base_freedoms
 from hdsim.estimate.predict import predictors
 from hdsim.estimate.refit import refit, together
+from hdsim.estimate.slopes import Slopes
 from hdsim.estimate.state import Added, state_of
 from hdsim.estimate.vector import Vector, sensitivities
 
@@ -50,6 +52,57 @@ def test_a_number_at_its_upper_end_is_asked_from_below(rig):
     x[-1] = vector.bounds()[1][-1]
     assert vector.steps(x)[-1] < 0.0 < vector.steps(vector.start() - 1.0)[-1]
     assert np.linalg.norm(sensitivities(bench, vector, x)[:, -1]) > 0.0
+
+
+class Cornered:
+    """Three numbers of which the third shows nothing until a spring's next section is reached, and then much.
+
+    What it shows until then is rounding, along what the first does.
+    """
+
+    names = ("stiffness", "inertia", "corner")
+    start, priors, bounds = np.zeros(3), np.ones(3), (np.full(3, -np.inf), np.full(3, np.inf))
+    blocks = np.arange(400) // 20
+    slopes = np.random.default_rng(3).standard_normal((400, 3)) * [100.0, 100.0, 0.0]
+    slopes[:, 2] = 1e-8 * slopes[:, 0]
+
+    def predicted(self, x):
+        reached = -x[2] > 1e-3
+        return self.slopes @ x + reached * np.sin(np.arange(400.0))
+
+    def residual(self, x):
+        return -self.predicted(x)
+
+    def steps(self, x):
+        return np.full(3, 0.03)
+
+    def changes(self, pairs):
+        return [self.predicted(ahead) - self.predicted(back) for back, ahead in pairs]
+
+    def sensitivities(self, x, first=0, like=None):
+        return self.slopes[:, first:]
+
+
+def test_a_number_that_turns_out_to_matter_does_not_bend_what_others_do():
+    """Their columns had been made 1e8 times as long, and every interval as narrow."""
+    problem = Cornered()
+    columns = Slopes(problem).proved(np.zeros(3))
+    assert np.linalg.norm(columns[:, :2] - problem.slopes[:, :2]) < 0.01 * np.linalg.norm(problem.slopes)
+    assert np.linalg.norm(columns[:, 2]) > 100.0  # the change over its step
+
+
+@pytest.mark.parametrize(("bumpy", "where"), [(1.0, 0.5), (0.0, 0.0)])
+def test_a_fit_begins_where_the_others_make_up_for_what_is_gone(bumpy, where):
+    """The first number does what the model has lost, at half the size; in between nothing leads there."""
+    direction = np.ones(100)
+    columns = direction[:, None]
+    problem = SimpleNamespace(
+        priors=np.ones(1),
+        bounds=(np.array([-2.0]), np.array([2.0])),
+        vector=SimpleNamespace(frees=["mass"], rates=lambda _: np.ones(1)),
+        residual=lambda x: (0.5 - x[0]) * direction if bumpy else x[0] * direction,
+    )
+    assert _made_up(problem, np.zeros(1), columns, -0.5 * direction)[0] == pytest.approx(where, abs=1e-6)
 
 
 @pytest.mark.slow
