@@ -46,7 +46,7 @@ def revised(bench: Bench, current: Fit, named: list[Named], tell: Callable[[str]
         others: list[Fit | None] = []
         for k, one in enumerate(named):
             tell(f"without {one.name}")
-            rest = without(bench, current, k)
+            rest = without(bench, current, k, made_up=True)
             one.needed = 1.0 if rest is None else needed(bench, rest, current)
             others.append(rest)
         k = _least_needed(bench, current, named, others)
@@ -182,17 +182,20 @@ def told(current: Fit, k: int) -> bool:
     return wald > float(chi2.isf(BY_CHANCE, len(sizes)))
 
 
-def without(bench: Bench, current: Fit, k: int) -> Fit | None:
+def without(bench: Bench, current: Fit, k: int, *, made_up: bool = False) -> Fit | None:
     """The model without an effect, all the rest fitted roughly from where it was; None where that fails.
 
     Args:
         bench: the measured series.
         current: the model with it.
         k: which of its effects.
+        made_up: begin where the others make up for it, which bends them as far as they can: it is asked
+            whether it is needed, and not what is missing without it.
     """
     gone, sizes = gone_with(current, k), current.state.added[k].coefficients
     known = gone.columns, math.nan
-    lost = -current.columns[:, current.numbers_of(k)][:, : len(sizes)] @ np.array(sizes)
+    change = -current.columns[:, current.numbers_of(k)][:, : len(sizes)] @ np.array(sizes)
+    lost = change if made_up else None
     try:
         return fit(bench, gone.state, gone.frees, prune=False, after=gone, known=known, lost=lost, rough=True)
     except (PredictionError, np.linalg.LinAlgError):

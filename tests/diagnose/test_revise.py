@@ -104,7 +104,7 @@ def test_what_looked_like_a_name_beside_another_of_the_same_effect_does_not_look
     fitted = SimpleNamespace(predictions=1.0)
     bench = SimpleNamespace(power=lambda predictions: predictions)
     for name, does in {
-        "without": lambda *_: fitted,
+        "without": lambda *_, **__: fitted,
         "needed": lambda *_: 1.0,
         "stand_ins": lambda *_: (0, 1),
         "together": lambda *_: fitted,
@@ -153,7 +153,7 @@ def test_models_without_a_name_are_carried_on_until_one_is_needless(
 def test_a_name_is_none_where_the_base_explains_as_much_from_there(monkeypatch, named, alone, better):
     fits = {power: SimpleNamespace(predictions=power) for power in (1000.0, named, alone)}
     bench = SimpleNamespace(power=float, noise_power=150.0)
-    monkeypatch.setattr("hdsim.diagnosis.revise.without", lambda *_: fits[alone])
+    monkeypatch.setattr("hdsim.diagnosis.revise.without", lambda *_, **__: fits[alone])
     monkeypatch.setattr("hdsim.diagnosis.revise.together", lambda _, found: found)
     assert base_alone(bench, fits[1000.0], fits[named]) is (fits[alone] if better else None)
 
