@@ -192,10 +192,11 @@ def without(bench: Bench, current: Fit, k: int, *, made_up: bool = False) -> Fit
         made_up: begin where the others make up for it, which bends them as far as they can: it is asked
             whether it is needed, and not what is missing without it.
     """
-    gone, sizes = gone_with(current, k), current.state.added[k].coefficients
-    known = gone.columns, math.nan
-    change = -current.columns[:, current.numbers_of(k)][:, : len(sizes)] @ np.array(sizes)
-    lost = change if made_up else None
+    gone = gone_with(current, k)
+    known, lost = (gone.columns, math.nan), None
+    if made_up:
+        sizes = np.array(current.state.added[k].coefficients)
+        lost = -current.columns[:, current.numbers_of(k)][:, : len(sizes)] @ sizes
     try:
         return fit(bench, gone.state, gone.frees, prune=False, after=gone, known=known, lost=lost, rough=True)
     except (PredictionError, np.linalg.LinAlgError):

@@ -25,7 +25,7 @@ from hdsim.estimate.numbers import REACH, Free, Interval, scaled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State
-from hdsim.estimate.vector import Measured, Vector, sensitivities
+from hdsim.estimate.vector import Measured, Vector, begun_within, sensitivities
 
 #: Largest logarithm of the factor to either end of an interval: e^20 says enough of what nobody knows.
 WIDEST = 20.0
@@ -148,9 +148,8 @@ def fit(
     problem = Measured(bench, vector, theta)
     x0 = problem.start
     if moves is not None:
-        lower, upper = problem.bounds
-        x0 = x0 + np.concatenate([np.zeros(len(chosen)), moves[len(chosen) :]])
-        x0 = np.clip(x0, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+        moved = x0 + np.concatenate([np.zeros(len(chosen)), moves[len(chosen) :]])
+        x0 = begun_within(moved, problem.bounds)
     if lost is not None and known is not None:
         x0 = _made_up(problem, x0, known[0], lost)
     predictions = problem.predicted(x0)
@@ -199,8 +198,7 @@ def _made_up(problem: Measured, x0: Array, columns: Array, lost: Array) -> Array
     """
     moves, own = _standing_in(columns, problem.priors, lost), len(problem.vector.frees)
     moves[:own] /= problem.vector.rates(x0)
-    lower, upper = problem.bounds
-    there = np.clip(x0 + moves, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+    there = begun_within(x0 + moves, problem.bounds)
     with contextlib.suppress(PredictionError):
         here, new = (problem.residual(x) for x in (x0, there))
         return there if float(new @ new) < float(here @ here) else x0

@@ -132,6 +132,12 @@ class Vector:
         return np.asarray(np.where(x + sizes > self.bounds()[1], -sizes, sizes))
 
 
+def begun_within(x: Array, bounds: tuple[Array, Array]) -> Array:
+    """The nearest place to ``x`` where a fit may begin: at a lower bound an optimiser's interior does not."""
+    lower, upper = bounds
+    return np.clip(x, np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+
+
 class Measured:
     """A model's free numbers against the training data: the problem that a fit of a model solves.
 
@@ -147,9 +153,8 @@ class Measured:
         for added in vector.base.added[vector.first :]:
             self.names += [f"{added.effect}, coefficient {k + 1}" for k in range(len(added.coefficients))]
             self.names += [f"{added.effect}.{shape.path}" for shape in added.fitting.shapes]
-        lower, upper = self.bounds = vector.bounds()
-        # The start may stand at a bound, where an optimiser's interior does not begin.
-        self.start = np.clip(vector.start(theta), np.where(np.isfinite(lower), lower + 1e-3, lower), upper)
+        self.bounds = vector.bounds()
+        self.start = begun_within(vector.start(theta), self.bounds)
         self.priors = vector.priors()
         self.centre = vector.centre(self.start)
         self.blocks = bench.stacked_blocks()
