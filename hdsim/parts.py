@@ -34,6 +34,8 @@ class State:
         initial: value at the start.
         scale: size at which an error of rtol matters, in the state's unit; sets its absolute tolerance.
         description: one line for the log.
+        on_spring: whether it is a torque, N m, parallel to the torsion spring (and its part puts minus it on
+            the twist): behind an open gap the spring rests where the two balance.
     """
 
     name: str
@@ -41,6 +43,7 @@ class State:
     initial: float
     scale: float
     description: str = ""
+    on_spring: bool = False
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ from hdsim.drive._layout import (
     LAMBDA,
     MESH_ADDRESS,
     MESH_AT,
+    ON_SPRING,
+    ON_SPRING_AT,
     OUTPUT_SHARE,
     OWN_STATES,
     RING,
@@ -32,11 +34,12 @@ from hdsim.drive._layout import (
     S_KINETIC,
     S_MESH,
     S_MESH_1,
+    S_MESH_2,
     S_POTENTIAL,
     S_RELATIVE,
     S_RING_1,
-    S_RING_2,
     S_TWIST_1,
+    S_TWIST_2,
     S_VELOCITIES,
     SIGNAL_OF,
     STATE_OF,
@@ -89,6 +92,10 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     if ring == RING_STATIC:
         balance_ring(integers, reals, scratch)
     elif not given:
+        held = 0.0
+        for k in range(integers[ON_SPRING]):
+            held += scratch[S_INPUTS + integers[integers[ON_SPRING_AT] + k]]
+        result[_mesh_layout.HELD_TORQUE] = held
         call_mesh(integers[MESH_ADDRESS], angles, error, reals[integers[MESH_AT] :], result)
     h_mm = result[_mesh_layout.HESSIAN]
     h_mf = result[_mesh_layout.HESSIAN + 1]
@@ -97,7 +104,7 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     h_ff = 0.0 if ring == RING_STATIC else result[_mesh_layout.HESSIAN + 3]
     h_fo = result[_mesh_layout.HESSIAN + 4]
     h_oo = result[_mesh_layout.HESSIAN + 5]
-    # The ports: first derivatives over the angles; second ones exist only through the error.
+    # The ports: their twists' first derivatives over the angles.
     torsion = scratch[S_TWIST_1 : S_TWIST_1 + 3]
     meshing = scratch[S_MESH_1 : S_MESH_1 + 3]
     inverse = reals[INVERSE_RATIO]
@@ -109,10 +116,6 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         meshing[0] = gain * (inverse + error[1])
         meshing[1] = -1.0
         meshing[2] = gain * (error[2] - reals[OUTPUT_SHARE])
-        curved_torsion = 0.0
-        curved_mesh = gain
-        twist = result[_mesh_layout.TWIST]
-        mesh_twist = result[_mesh_layout.MESH_TWIST]
     elif ring == RING_STATIC:
         # Twist of the cup alone, as with a ring of its own: the gap is in the mesh, where nothing damps it.
         gain = reals[GAIN]
@@ -122,20 +125,17 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         meshing[0] = gain * (inverse + error[1]) - scratch[S_RING_1]
         meshing[1] = 0.0
         meshing[2] = gain * (error[2] - reals[OUTPUT_SHARE]) - scratch[S_RING_1 + 2]
-        curved_torsion = 0.0
-        curved_mesh = gain
-        twist = result[_mesh_layout.TWIST]
-        mesh_twist = result[_mesh_layout.MESH_TWIST]
     else:
-        torsion[0] = inverse + error[1]
+        # Of the spring alone as well: what has no teeth in contact does not wind up what lies behind them.
+        gain = 1.0
+        torsion[0] = result[_mesh_layout.TWIST_M]
         torsion[1] = 0.0
-        torsion[2] = error[2] - 1.0
-        for a in range(3):
-            meshing[a] = torsion[a]
-        curved_torsion = 1.0
-        curved_mesh = 1.0
-        twist = angles[0] * inverse - angles[2] + error[0]
-        mesh_twist = twist
+        torsion[2] = result[_mesh_layout.TWIST_O]
+        meshing[0] = inverse + error[1]
+        meshing[1] = 0.0
+        meshing[2] = error[2] - 1.0
+    twist = result[_mesh_layout.TWIST]
+    mesh_twist = result[_mesh_layout.MESH_TWIST]
     twist_rate = 0.0
     mesh_rate = 0.0
     for a in range(3):
@@ -203,12 +203,17 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     unread = STORED if integers[ENERGIES] > 0 else DISSIPATED
     vm = seen[0]
     vo = seen[2]
-    bent_m = error[3] * vm + error[4] * vo
-    bent_o = error[4] * vm + error[5] * vo
-    scratch[S_RING_2 : S_RING_2 + 3] = 0.0
+    bent = scratch[S_TWIST_2 : S_TWIST_2 + 3]
+    bent_mesh = scratch[S_MESH_2 : S_MESH_2 + 3]
+    bent[:] = 0.0
     if ring == RING_STATIC:
         ring_curvature(integers, reals, scratch)
-    ring_mm, ring_mo, ring_oo = scratch[S_RING_2], scratch[S_RING_2 + 1], scratch[S_RING_2 + 2]
+    for k in range(3):
+        bent_mesh[k] = gain * error[3 + k]
+        if ring == RING_STATIC:
+            bent_mesh[k] -= bent[k]
+        elif ring != RING_DYNAMIC:
+            bent[k] = result[_mesh_layout.TWIST_2 + k]
     for r in range(rows):
         if unread <= r < OWN:
             continue
@@ -229,10 +234,10 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         for a in range(3):
             row[2 * a] += d_twist * torsion[a] + d_mesh * meshing[a]
             row[2 * a + 1] += d_rate * torsion[a] + d_mesh_rate * meshing[a]
-        bent = d_rate * curved_torsion + d_mesh_rate * curved_mesh
-        moved = d_rate - d_mesh_rate
-        row[MOTOR_ANGLE] += bent * bent_m - d_tau * h_mo + moved * (ring_mm * vm + ring_mo * vo)
-        row[OUTPUT_ANGLE] += bent * bent_o - d_tau * h_oo + moved * (ring_mo * vm + ring_oo * vo)
+        row[MOTOR_ANGLE] += d_rate * (bent[0] * vm + bent[1] * vo) - d_tau * h_mo
+        row[MOTOR_ANGLE] += d_mesh_rate * (bent_mesh[0] * vm + bent_mesh[1] * vo)
+        row[OUTPUT_ANGLE] += d_rate * (bent[1] * vm + bent[2] * vo) - d_tau * h_oo
+        row[OUTPUT_ANGLE] += d_mesh_rate * (bent_mesh[1] * vm + bent_mesh[2] * vo)
         row[RING_ANGLE] -= d_tau * h_fo
         if housing > 0:
             # What came in through the mesh depends on the angles as seen from the housing.
@@ -241,13 +246,12 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
             row[housing + 1] += by_velocities
             row[housing + 1] -= row[MOTOR_ANGLE + 1] + row[RING_ANGLE + 1] + row[OUTPUT_ANGLE + 1]
     # Torque rows: the ports' rows through their levers, then the potential.
-    bent = outputs[TWIST_TORQUE] * curved_torsion + outputs[MESH_TORQUE] * curved_mesh
-    moved = outputs[TWIST_TORQUE] - outputs[MESH_TORQUE]
-    slope_mo = bent * error[4] - h_mo + moved * ring_mo
+    torque, mesh_torque = outputs[TWIST_TORQUE], outputs[MESH_TORQUE]
+    slope_mo = torque * bent[1] + mesh_torque * bent_mesh[1] - h_mo
     slopes = (
-        (bent * error[3] - h_mm + moved * ring_mm, -h_mf, slope_mo),
+        (torque * bent[0] + mesh_torque * bent_mesh[0] - h_mm, -h_mf, slope_mo),
         (-h_mf, -h_ff, -h_fo),
-        (slope_mo, -h_fo, bent * error[5] - h_oo + moved * ring_oo),
+        (slope_mo, -h_fo, torque * bent[2] + mesh_torque * bent_mesh[2] - h_oo),
     )
     for a in range(3):
         if a == 1 and ring != RING_DYNAMIC:

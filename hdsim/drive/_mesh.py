@@ -26,6 +26,7 @@ from hdsim.drive._mesh_layout import (
     EXTRA_GAP,
     GAIN,
     GRADIENT,
+    HELD_TORQUE,
     HESSIAN,
     INVERSE_RATIO,
     KAPPA,
@@ -39,6 +40,9 @@ from hdsim.drive._mesh_layout import (
     SPRING_CELLS,
     SPRING_STEP,
     TWIST,
+    TWIST_2,
+    TWIST_M,
+    TWIST_O,
     WAVES,
     WAVES_AT,
 )
@@ -110,12 +114,38 @@ def table_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-de
     result[MESH_TWIST] = twist
 
 
+@_inline
+def resting(p, at, step, cells, held, low, high):  # type: ignore[no-untyped-def]
+    """Twist between two others at which a spring bears -held: Newton's method, safeguarded."""
+    if held == 0.0:
+        return 0.0
+    twist = 0.5 * (low + high)
+    for _ in range(60):
+        _, torque, stiffness = spring(p, at, step, cells, twist, 0.0)
+        if torque + held > 0.0:
+            high = twist
+        else:
+            low = twist
+        following = twist - (torque + held) / stiffness
+        if not (low <= following <= high):
+            following = 0.5 * (low + high)
+        if abs(following - twist) <= 1e-15:
+            break
+        twist = following
+    return twist
+
+
 @mesh
 def lumped_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-def]
     """The catalogue's spring over phi = theta_m / i - theta_o + e, behind an optional gap.
 
     The half-gap may go round with the angles, h = h_0 + sum A sin(a theta_m + b theta_o + p), nowhere below
-    zero. Of one potential U(|phi| - h) are the torques T (dphi - sign(T) dh).
+    zero. The spring's own twist chi, which damper and hysteresis see, is what is left of phi,
+
+        chi = phi - h while T(phi - h) + F > 0,    phi + h while T(phi + h) + F < 0,    else T(chi) = -F
+
+    with the torque F of what is parallel to the spring, which ``result`` holds: teeth only push, and inside
+    the gap nothing is transmitted and chi stands still, as behind a ring without inertia.
     """
     p = parameters
     twist = angles[0] * p[INVERSE_RATIO] - angles[2] + error[0]
@@ -124,18 +154,31 @@ def lumped_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-d
     twist_mm, twist_mo, twist_oo = error[3], error[4], error[5]
     gap, waves = p[EXTRA_GAP], int(p[WAVES])
     for k in range(waves):
-        at = int(p[WAVES_AT]) + PER_WAVE * k
-        gap += p[at] * math.sin(p[at + 1] * angles[0] + p[at + 2] * angles[2] + p[at + 3])
-    energy, torque, stiffness = spring(
-        p, int(p[SPRING_AT]), p[SPRING_STEP], p[SPRING_CELLS], twist, max(gap, 0.0)
-    )
-    if torque != 0.0 and gap > 0.0:
-        sign = math.copysign(1.0, torque)
+        w = int(p[WAVES_AT]) + PER_WAVE * k
+        gap += p[w] * math.sin(p[w + 1] * angles[0] + p[w + 2] * angles[2] + p[w + 3])
+    half, held = max(gap, 0.0), result[HELD_TORQUE]
+    at, step, cells = int(p[SPRING_AT]), p[SPRING_STEP], p[SPRING_CELLS]
+    pressed = 0.0
+    own = twist - half
+    energy, torque, stiffness = spring(p, at, step, cells, own, 0.0)
+    if half > 0.0:
+        pressed = 1.0
+        if torque + held <= 0.0:
+            pressed = -1.0
+            own = twist + half
+            energy, torque, stiffness = spring(p, at, step, cells, own, 0.0)
+            if torque + held >= 0.0:
+                pressed = 0.0
+                own = resting(p, at, step, cells, held, twist - half, own)
+                energy, torque, stiffness = spring(p, at, step, cells, own, 0.0)[0], 0.0, 0.0
+                twist_m = twist_o = twist_mm = twist_mo = twist_oo = 0.0
+    if pressed != 0.0:
+        sign = pressed
         for k in range(waves):
-            at = int(p[WAVES_AT]) + PER_WAVE * k
-            a, b = p[at + 1], p[at + 2]
-            angle = a * angles[0] + b * angles[2] + p[at + 3]
-            sine, cosine = sign * p[at] * math.sin(angle), sign * p[at] * math.cos(angle)
+            w = int(p[WAVES_AT]) + PER_WAVE * k
+            a, b = p[w + 1], p[w + 2]
+            angle = a * angles[0] + b * angles[2] + p[w + 3]
+            sine, cosine = sign * p[w] * math.sin(angle), sign * p[w] * math.cos(angle)
             twist_m -= a * cosine
             twist_o -= b * cosine
             twist_mm += a * a * sine
@@ -151,5 +194,7 @@ def lumped_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-d
     result[HESSIAN + 3] = 1.0
     result[HESSIAN + 5] = stiffness * twist_o * twist_o + torque * twist_oo
     result[MESH_TWIST] = twist
-    result[TWIST] = twist
+    result[TWIST] = own
+    result[TWIST_M], result[TWIST_O] = twist_m, twist_o
+    result[TWIST_2], result[TWIST_2 + 1], result[TWIST_2 + 2] = twist_mm, twist_mo, twist_oo
     result[ENGAGED] = math.nan

@@ -7,7 +7,11 @@ HESSIAN = 4  # mm, mf, mo, ff, fo, oo
 MESH_TWIST = 10
 TWIST = 11
 ENGAGED = 12  # number of teeth that carry load
-RESULT_SIZE = 16
+TWIST_M = 13  # of a lumped mesh: first derivatives of TWIST over motor and output
+TWIST_O = 14
+TWIST_2 = 15  # and second ones: mm, mo, oo
+HELD_TORQUE = 18  # given to it, and left there: what is parallel to its spring, N m
+RESULT_SIZE = 19
 
 # Parameters of a toothed mesh: a header, then the arrays at their offsets.
 TEETH = 0

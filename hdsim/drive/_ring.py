@@ -20,8 +20,8 @@ from hdsim.drive._layout import (
     S_MESH,
     S_RELATIVE,
     S_RING_1,
-    S_RING_2,
     S_SPARE,
+    S_TWIST_2,
     S_VELOCITIES,
 )
 from hdsim.drive._terms import read_error
@@ -80,7 +80,7 @@ def balance_ring(integers, reals, scratch):  # type: ignore[no-untyped-def]
 
 @_jit
 def ring_curvature(integers, reals, scratch):  # type: ignore[no-untyped-def]
-    """Second derivatives (mm, mo, oo) of the ring angle f(m, o) in static balance, into the scratch.
+    """Second derivatives (mm, mo, oo) of the ring angle f(m, o) in static balance: of the torsion twist.
 
     From V_f(m, f(m, o), o) = 0 twice: f_ab = -D_a (V_fb + V_ff f_b) / V_ff, D_a along (e_a + f_a e_f) and f_b
     held, by central differences of the Hessian: exact to about 1e-6 of what it is added to.
@@ -111,4 +111,4 @@ def ring_curvature(integers, reals, scratch):  # type: ignore[no-untyped-def]
                 oo += share * along_o
     angles[0], angles[1], angles[2] = motor, ring, output
     read_error(integers, reals, scratch)
-    scratch[S_RING_2], scratch[S_RING_2 + 1], scratch[S_RING_2 + 2] = mm, mo, oo
+    scratch[S_TWIST_2], scratch[S_TWIST_2 + 1], scratch[S_TWIST_2 + 2] = mm, mo, oo

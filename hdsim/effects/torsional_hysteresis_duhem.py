@@ -109,7 +109,12 @@ class TorsionalHysteresisDuhem(Effect):
         if self.saturation_twist_mrad is not None:
             stiffness = 1e3 * self.saturation_torque_nm / self.saturation_twist_mrad
         state = State(
-            "hysteresis_torque", "N m", 0.0, self.saturation_torque_nm, "torque of the Duhem hysteresis"
+            "hysteresis_torque",
+            "N m",
+            0.0,
+            self.saturation_torque_nm,
+            "torque of the Duhem hysteresis",
+            on_spring=True,
         )
         numbers = [stiffness, self.saturation_torque_nm, self.exponent]
         build.element(duhem, numbers, states=(state,))

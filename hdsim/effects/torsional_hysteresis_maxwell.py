@@ -179,6 +179,7 @@ class TorsionalHysteresisMaxwell(Effect):
                 0.0,
                 e.slip_torque_nm,
                 f"torque of Maxwell slip element {i}",
+                on_spring=True,
             )
             for i, e in enumerate(elements, 1)
         ]

@@ -204,18 +204,13 @@ class Plant:
             return np.array(full[TWIST_TORQUE, self._kept])
         torsion, meshing = s[a.S_TWIST_1 + 2], s[a.S_MESH_1 + 2]
         row = torsion * full[TWIST_TORQUE, self._kept] + meshing * full[MESH_TORQUE, self._kept]
-        _, _, _, _, by_mo, by_oo = s[a.S_ERROR : a.S_ERROR + 6]
-        # How the levers bend with the kinematic error, as in the assembly: by the arrangement's gain.
-        if self.system.integers[a.RING] != a.RING_ABSENT:
-            bent = outputs[MESH_TORQUE] * self.system.reals[a.GAIN]
-        else:
-            bent = outputs[TWIST_TORQUE] + outputs[MESH_TORQUE]
         hessian = s[a.S_MESH + _mesh_layout.HESSIAN : a.S_MESH + _mesh_layout.HESSIAN + 6]
         row[[0, 2, 4]] -= hessian[[2, 4, 5]]
-        # And with a ring in balance, which moves with both.
-        moved = outputs[TWIST_TORQUE] - outputs[MESH_TORQUE]
-        bent_mo = bent * by_mo + moved * s[a.S_RING_2 + 1]
-        bent_oo = bent * by_oo + moved * s[a.S_RING_2 + 2]
+        # How the levers bend, with the kinematic error and with a ring in balance.
+        bent_mo, bent_oo = (
+            outputs[TWIST_TORQUE] * s[a.S_TWIST_2 + k] + outputs[MESH_TORQUE] * s[a.S_MESH_2 + k]
+            for k in (1, 2)
+        )
         row[0] += bent_mo
         row[4] += bent_oo
         housing = int(self.system.integers[a.HOUSING])

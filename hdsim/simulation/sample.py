@@ -169,8 +169,9 @@ def _beside(model: Model, others: Sequence[Model]) -> Beside:
         seen = np.ones(len(system.reals), dtype=bool)
         seen[layout.INSIDE : layout.INERTIA + 3] = seen[layout.HOUSING_INERTIA] = False
         # The elements' numbers come first; twists', signals' and the mesh's own follow.
-        lists = system.integers[layout.LISTS + layout.PER_ELEMENT * system.integers[layout.ELEMENTS] :]
-        seen[layout.PARAMETERS : min([int(system.integers[layout.MESH_AT]), *lists[1::2]])] = False
+        first = layout.LISTS + layout.PER_ELEMENT * system.integers[layout.ELEMENTS]
+        places = system.integers[first + 1 : system.integers[layout.ON_SPRING_AT] : 2]
+        seen[layout.PARAMETERS : min([int(system.integers[layout.MESH_AT]), *places])] = False
         integers[:, layout.GIVEN] = (reals[:, seen] == system.reals[seen]).all(axis=1)
     return Beside(
         reals,

@@ -223,9 +223,9 @@ def _drawn(number: int, seed: int, rng: np.random.Generator) -> Try:
     chosen = [str(k) for k in rng.choice(allowed, len(given) + len(held))]
     motions = [told(k, s, d, sensing, rng) for k, s in zip(chosen, (*given, *held), strict=True)]
     base = base_yaml(d)
-    mesh = Teeth(
-        str(rng.choice(["teeth", "tabulated"], p=[0.7, 0.3])), "static", 0.0, int(rng.integers(2**31))
-    )
+    # Behind a gap a hysteresis needs a ring that moves: in static balance it does not hold it.
+    ring = "dynamic" if gapped and h is not None and h.name in HYSTERESIS else "static"
+    mesh = Teeth(str(rng.choice(["teeth", "tabulated"], p=[0.7, 0.3])), ring, 0.0, int(rng.integers(2**31)))
     teeth = replace(mesh, gap=log_uniform(rng, *GAPS)) if gapped else mesh
     effects: Effects = {}
     strengths, near, truth = [], 1.0, {}

@@ -173,7 +173,7 @@ def test_the_damper_in_contact_obeys_the_second_law_whatever_its_numbers() -> No
         rate, tau, damping = rng.normal(size=3) * 10 ** rng.uniform(-6, 2, 3) * [1, rng.choice([0, 1]), 1]
         inputs, outputs, jacobian = np.zeros(OWN), np.zeros(OWN), np.zeros(OWN * OWN)
         inputs[TWIST_RATE], inputs[TRANSMITTED_TORQUE] = rate, tau
-        contact_damping.function(inputs, [abs(damping)], OWN, OWN, outputs, jacobian)
+        contact_damping.function(inputs, [abs(damping), 0.0], OWN, OWN, outputs, jacobian)
         assert abs(outputs[TWIST_TORQUE]) <= abs(tau)  # the sum with the spring's torque never pulls
         assert outputs[DISSIPATED] == -outputs[TWIST_TORQUE] * rate >= 0
 
@@ -196,4 +196,94 @@ def test_the_jacobian_is_exact_with_play_and_damping(mesh: dict[str, Any], arran
             }
         )
     )  # fmt: skip
+    check(model.system)
+
+
+def test_a_hysteresis_behind_a_play_winds_up_by_what_the_teeth_bear() -> None:
+    """In series: twist = chi(tau) + b/2 sign(tau), chi of spring and slider by return mapping."""
+    slider = {"stiffness_nm_per_rad": 2e4, "slip_torque_nm": 8.0}
+    found = build_run(
+        Scenario.model_validate(
+            {
+                "drive": {"preset": "seed-2021", "mesh": {"model": "lumped"}} | LINEAR,
+                "effects": {
+                    "output_backlash": {"backlash_arcmin": PLAY_ARCMIN},
+                    "torsional_hysteresis_maxwell": {"elements": [slider], "sharpness": 400.0},
+                },
+                "command": {"motor": {"type": "motion", "trajectory": {"type": "hold", "angle_deg": 0}}},
+                "load": {
+                    "inertia_kg_m2": 0.05,
+                    "torque": {"type": "sine", "amplitude_nm": 40.0, "frequency_hz": 0.5},
+                },
+                "run": {"duration_s": 4.0, "sample_rate_hz": 500, "rtol": 1e-8},
+            }
+        )
+    ).record()
+    twist, torque = -found["output_angle"], found["output_torque"]
+    chi = slid = 0.0
+    expected = np.zeros(len(torque))
+    for k, tau in enumerate(torque):
+        chi = (tau + 2e4 * slid) / (STIFFNESS + 2e4)
+        force = 2e4 * (chi - slid)
+        if abs(force) > 8.0:
+            force = np.copysign(8.0, force)
+            chi = (tau - force) / STIFFNESS
+            slid = chi - force / 2e4
+        expected[k] = chi + HALF_PLAY * np.sign(tau)
+    borne = np.abs(torque) > 12.0  # past the impact, whose damper bears a part
+    assert np.mean(borne) > 0.7
+    lag = 8.0 / STIFFNESS  # by which the play would lie beside its place if the slider bridged it
+    assert np.max(np.abs(twist - expected)[borne]) < 0.1 * lag
+    assert np.mean(torque == 0.0) > 0.01  # while it flies from flank to flank, none at all
+    assert np.max(np.abs(found["energy_residual"])) < 1e-6 * found["heat"][-1]
+
+
+SLIPS: dict[str, dict[str, Any]] = {
+    "torsional_hysteresis_maxwell": {"slip_torque_nm": 10.0},
+    "torsional_hysteresis_duhem": {"saturation_torque_nm": 10.0, "saturation_twist_mrad": 0.3},
+}
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_behind_a_play_a_lumped_mesh_and_a_ring_of_its_own_have_one_hysteresis(name: str) -> None:
+    # With the slider across the gap they were 0.3 arcmin apart, a third of the play.
+    teeth = {"model": "tabulated", "half_gap_m": 0.0, "contact": STIFF}
+    angles = []
+    for mesh in (teeth, {"model": "lumped"}):
+        found = build_run(
+            Scenario.model_validate(
+                {
+                    "drive": {"preset": "seed-2021", "mesh": mesh},
+                    "effects": {"output_backlash": {"backlash_arcmin": 1.0}, name: SLIPS[name]},
+                    "command": {"motor": {"type": "motion", "trajectory": {"type": "hold", "angle_deg": 0}}},
+                    "load": {
+                        "inertia_kg_m2": 0.5,
+                        "torque": {"type": "sine", "amplitude_nm": 40.0, "frequency_hz": 0.5},
+                    },
+                    "run": {"duration_s": 6.0, "sample_rate_hz": 500, "rtol": 1e-7},
+                }
+            )
+        ).record()
+        assert np.max(np.abs(found["energy_residual"])) < 1e-6 * found["heat"][-1]
+        angles.append(found["output_angle"] / ARCSEC / 60)
+    assert np.ptp(angles[0]) > 9.0
+    assert np.std(angles[1] - angles[0]) < 0.05  # where they slip, the teeth's own twist is no longer apart
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_the_jacobian_is_exact_with_a_hysteresis_behind_a_play_that_goes_round(name: str) -> None:
+    play = {
+        "backlash_arcmin": 1.0, "components": [{"order": 2, "amplitude_arcmin": 0.2, "phase_deg": 20.0}],
+    }  # fmt: skip
+    model = build_model(
+        Scenario.model_validate(
+            {
+                "drive": {"preset": "seed-2021", "mesh": {"model": "lumped"}},
+                "effects": {"output_backlash": play, "kinematic_error": {}, name: SLIPS[name]},
+                "load": {"inertia_kg_m2": 0.5},
+                "command": {"motor": {"type": "free"}},
+                "run": {"duration_s": 1.0},
+            }
+        )
+    )
     check(model.system)
