@@ -139,6 +139,8 @@ class Builder(Protocol):
     ratio: float
     """Signed ratio motor angle / output angle."""
     rated_torque_nm: float
+    twist_sign: float
+    """Sign of the torque on the output at a positive twist of the torsion spring, 1 or -1."""
     input_frictions: Sequence[InputFriction]
     """Friction on the motor shaft, of the drive and of every part that has declared its own."""
     seed: int

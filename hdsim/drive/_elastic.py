@@ -30,6 +30,7 @@ from hdsim.drive._layout import (
     S_ACCELERATIONS,
     S_CONSTRAINT,
     S_ERROR,
+    S_HELD,
     S_INPUTS,
     S_KINETIC,
     S_MESH,
@@ -89,12 +90,12 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     error = scratch[S_ERROR : S_ERROR + 6]
     result = scratch[S_MESH : S_MESH + _mesh_layout.RESULT_SIZE]
     ring = integers[RING]
+    held = 0.0
+    for k in range(integers[ON_SPRING]):
+        held += scratch[S_INPUTS + integers[integers[ON_SPRING_AT] + k]]
     if ring == RING_STATIC:
         balance_ring(integers, reals, scratch)
     elif not given:
-        held = 0.0
-        for k in range(integers[ON_SPRING]):
-            held += scratch[S_INPUTS + integers[integers[ON_SPRING_AT] + k]]
         result[_mesh_layout.HELD_TORQUE] = held
         call_mesh(integers[MESH_ADDRESS], angles, error, reals[integers[MESH_AT] :], result)
     h_mm = result[_mesh_layout.HESSIAN]
@@ -141,9 +142,10 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
     for a in range(3):
         twist_rate += torsion[a] * seen[a]
         mesh_rate += meshing[a] * seen[a]
-    fill_inputs(
-        t, integers, scratch, -result[_mesh_layout.GRADIENT + 2], twist, twist_rate, mesh_twist, mesh_rate
-    )
+    # Of what is parallel to the spring as well: the teeth carry both.
+    transmitted = -result[_mesh_layout.GRADIENT + 2] - held * torsion[2]
+    scratch[S_HELD] = -held * torsion[2]
+    fill_inputs(t, integers, scratch, transmitted, twist, twist_rate, mesh_twist, mesh_rate)
     run_elements(integers, reals, scratch, want_jacobian)
 
     columns = integers[COLUMNS]
@@ -234,9 +236,11 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         for a in range(3):
             row[2 * a] += d_twist * torsion[a] + d_mesh * meshing[a]
             row[2 * a + 1] += d_rate * torsion[a] + d_mesh_rate * meshing[a]
-        row[MOTOR_ANGLE] += d_rate * (bent[0] * vm + bent[1] * vo) - d_tau * h_mo
+        for k in range(integers[ON_SPRING]):
+            row[integers[integers[ON_SPRING_AT] + k]] -= d_tau * torsion[2]
+        row[MOTOR_ANGLE] += d_rate * (bent[0] * vm + bent[1] * vo) - d_tau * (h_mo + held * bent[1])
         row[MOTOR_ANGLE] += d_mesh_rate * (bent_mesh[0] * vm + bent_mesh[1] * vo)
-        row[OUTPUT_ANGLE] += d_rate * (bent[1] * vm + bent[2] * vo) - d_tau * h_oo
+        row[OUTPUT_ANGLE] += d_rate * (bent[1] * vm + bent[2] * vo) - d_tau * (h_oo + held * bent[2])
         row[OUTPUT_ANGLE] += d_mesh_rate * (bent_mesh[1] * vm + bent_mesh[2] * vo)
         row[RING_ANGLE] -= d_tau * h_fo
         if housing > 0:

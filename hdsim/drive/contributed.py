@@ -53,6 +53,7 @@ class Contributed:
         self._own_before = 0
         self._names: dict[str, int] = {}
         self.input_frictions: Sequence[InputFriction] = ()
+        self.twist_sign = 1.0
 
     def element(
         self,

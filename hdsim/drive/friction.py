@@ -58,14 +58,10 @@ def contact_damping(inputs, parameters, own, columns, outputs, jacobian):  # typ
     """Viscous damper parallel to the torsion spring of a drive with play.
 
     P = -c chi' within +-|tau|: what is not in contact is not damped, and spring and damper together never
-    pull what only touches (the limit of Modelica's ``ElastoBacklash``). To tau belongs what else is parallel
-    to the spring. Parameters: c, N m s/rad; number of own states that are such torques, and their columns.
+    pull what only touches (the limit of Modelica's ``ElastoBacklash``). Parameter: c, N m s/rad.
     """
     rate = inputs[TWIST_RATE]
     tau = inputs[TRANSMITTED_TORQUE]
-    parallel = int(parameters[1])
-    for k in range(parallel):
-        tau += inputs[int(parameters[2 + k])]
     torque = parameters[0] * rate
     by_rate, by_tau = parameters[0], 0.0
     if abs(torque) > abs(tau):
@@ -78,9 +74,6 @@ def contact_damping(inputs, parameters, own, columns, outputs, jacobian):  # typ
     jacobian[TWIST_TORQUE * columns + TRANSMITTED_TORQUE] -= by_tau
     jacobian[DISSIPATED * columns + TWIST_RATE] += by_rate * rate + torque
     jacobian[DISSIPATED * columns + TRANSMITTED_TORQUE] += by_tau * rate
-    for k in range(parallel):
-        jacobian[TWIST_TORQUE * columns + int(parameters[2 + k])] -= by_tau
-        jacobian[DISSIPATED * columns + int(parameters[2 + k])] += by_tau * rate
 
 
 @element

@@ -72,6 +72,8 @@ class Model(Contributed):
         self.parts = tuple(parts)
         self.ratio = drive.ratio
         self.rated_torque_nm = drive.rated_torque_nm
+        toothed = isinstance(drive.mesh, TeethMesh | TabulatedMesh)
+        self.twist_sign = -1.0 if toothed and drive.arrangement == "flexspline_fixed" else 1.0
         self.seed = seed
         self.motions = dict(motions or {})
         self._offered = dict(signals or {})
@@ -79,7 +81,7 @@ class Model(Contributed):
         self.teeth: Teeth | None = None
         # The signals' columns follow the own states, whose number is known only after a first pass; so is the
         # friction of all parts.
-        self._has_play, self._film_share, self._on_spring = False, 0.0, list[int]()
+        self._has_play, self._film_share = False, 0.0
         for _ in range(2):
             self._given = Contributions()
             self.motion_columns = {name: self.signal(motion) for name, motion in self.motions.items()}
@@ -89,8 +91,6 @@ class Model(Contributed):
             given = self._given
             self._has_play = given.play or given.half_gap_rad > 0.0 or bool(given.gap_waves)
             self._film_share, self._own_before = given.film_share, len(given.states)
-            held = self._has_play and isinstance(drive.mesh, LumpedMesh)
-            self._on_spring = [OWN + k for k, s in enumerate(given.states) if s.on_spring and held]
             self._names = {state.name: OWN + k for k, state in enumerate(self._given.states)}
             self.input_frictions = tuple(self._given.input_frictions)
         if len(self._names) < len(self._given.states):
@@ -121,11 +121,9 @@ class Model(Contributed):
         if damping > 0 and not self.rigid:
             # A ring of its own has its own twist; else damper and play are in series, but share one twist.
             free_play = isinstance(mesh, TeethMesh | TabulatedMesh) or self._has_play
-            own, held = (1.0 - self._film_share) * damping, self._on_spring
-            if self._film_share < 1.0 and free_play and not self.has_ring:
-                self.element(friction.contact_damping, [own, len(held), *held])
-            elif self._film_share < 1.0:
-                self.element(friction.torsion_damping, [own])
+            kernel = friction.contact_damping if free_play and not self.has_ring else friction.torsion_damping
+            if self._film_share < 1.0:
+                self.element(kernel, [(1.0 - self._film_share) * damping])
             if self._film_share > 0.0:
                 self.element(friction.mesh_damping, [self._film_share * damping])
         if isinstance(mesh, TeethMesh | TabulatedMesh) and mesh.damping_nm_s_per_rad > 0:
@@ -229,7 +227,8 @@ class Model(Contributed):
             lists += [twist_kernel.address, place(parameters)]
         for signal in given.signals:
             lists += [signal.kernel.address, place(np.asarray(signal.pack(), dtype=np.float64))]
-        lists += self._on_spring
+        on_spring = [OWN + k for k, state in enumerate(given.states) if state.on_spring]
+        lists += on_spring
 
         head_integers = np.zeros(a.LISTS, dtype=np.int64)
         head_integers[a.STATES] = states
@@ -239,8 +238,8 @@ class Model(Contributed):
         head_integers[a.ELEMENTS] = len(given.elements)
         head_integers[a.TWISTS] = len(given.twists)
         head_integers[a.COLUMNS] = columns
-        held = len(self._on_spring)
-        head_integers[[a.ON_SPRING, a.ON_SPRING_AT]] = held, a.LISTS + len(lists) - held
+        head_integers[a.ON_SPRING] = len(on_spring)
+        head_integers[a.ON_SPRING_AT] = a.LISTS + len(lists) - len(on_spring)
         head_integers[a.ACCOUNTS] = len(self.heat_accounts)
         if given.housing is not None and not self.rigid:
             head_integers[a.HOUSING], head[a.HOUSING_INERTIA] = given.housing

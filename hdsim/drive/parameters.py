@@ -186,7 +186,8 @@ class ToothedMesh(Parameters):
     damping_nm_s_per_rad: float = Field(0.0, ge=0)
     """Viscous damping parallel to the mesh, as a torsional damping at the output, N m s/rad."""
     ring: Literal["dynamic", "static"] = "dynamic"
-    """Ring inertia as a degree of freedom, or eliminated by static balance of mesh and cup."""
+    """Ring inertia as a degree of freedom, or eliminated by static balance of mesh and cup: inside a gap the
+    cup is then without twist, whatever a hysteresis would hold."""
 
 
 class TeethMesh(ToothedMesh):

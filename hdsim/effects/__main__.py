@@ -33,10 +33,11 @@ effects:
 ```
 
 Torques act on the named body. `theta_m` is the motor's angle, `theta_l` the output's, `i` the signed ratio
-`theta_m / theta_l`, `tau` the elastic torque of the drive on the output, `w` a speed. Every friction is
-dissipative and every spring stores what it takes: the tests check it for each effect at random states, and
-its derivatives too. sign(w) of speed-dependent friction is `tanh(w / smoothing velocity)`: below that speed
-the drive creeps instead of sticking; LuGre friction and hysteresis have states instead and stick.
+`theta_m / theta_l`, `tau` the torque of the drive on the output, elastic and of hysteresis, `w` a speed.
+Every friction is dissipative and every spring stores what it takes: the tests check it for each effect at
+random states, and its derivatives too. sign(w) of speed-dependent friction is `tanh(w / smoothing
+velocity)`: below that speed the drive creeps instead of sticking; LuGre friction and hysteresis have states
+instead and stick.
 
 The defaults below are those of size 20 at ratio 100. For another drive they grow with what *usually* is a
 multiple of; kinematic error and torsional hysteresis follow the printed accuracy and hysteresis loss of the

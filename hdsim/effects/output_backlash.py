@@ -49,6 +49,8 @@ class OutputBacklash(Effect):
     the last tooth bears: a gap of (1 - s) b/2 and, in series with the torsion spring,
     d = s b/2 (2 u - u^2) with u = sqrt(min(|tau|/T, 1)). The springs of all teeth together are the drive's.
 
+    The gap is in series with the spring and what is parallel to it: inside, a hysteresis transmits nothing.
+
     Nothing damps the gap unless a share f of the drive's damper c is that of the grease between the flanks:
     -f c dDelta/dt acts in the gap, too, and the rest where flanks touch.
 

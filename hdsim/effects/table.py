@@ -111,7 +111,7 @@ class TableCurve(Parameters):
     """One tabulated curve."""
 
     coordinate: Coordinate
-    """What the curve is a function of; ``transmitted_torque`` is the drive's elastic torque on the output,
+    """What the curve is a function of; ``transmitted_torque`` is the drive's torque on the output,
     ``twist`` that of its torsion spring."""
     acts_on: Acting
     """What the values are: a torque on the motor, on the output, or on the torsion spring's twist (a spring

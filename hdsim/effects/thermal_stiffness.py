@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from hdsim.effects._fitting import Amplitude, Fitting, Plausible
-from hdsim.kernel import SUPPLIED, TRANSMITTED_TORQUE, TWIST, TWIST_RATE, TWIST_TORQUE, element
+from hdsim.kernel import SUPPLIED, TRANSMITTED_TORQUE, TWIST_RATE, TWIST_TORQUE, element
 from hdsim.number import FIXED
 from hdsim.parts import Builder, Effect, Signature
 
 
 @element
 def softening(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
-    """Part of the spring's torque that is gone. Parameters: the temperature's column (0: none), T, T_0, beta.
+    """Part of the spring's torque that is gone, on the twist.
 
-    Whatever the arrangement, the spring pulls against the twist: its sign is that of the twist.
+    Parameters: the temperature's column (0: none), T, T_0, beta; sign of the torque at a positive twist.
     """
     column = int(parameters[0])
     above = (inputs[column] if column > 0 else parameters[1]) - parameters[2]
     load = inputs[TRANSMITTED_TORQUE]
     rate = inputs[TWIST_RATE]
-    side = math.copysign(1.0, load) * math.copysign(1.0, inputs[TWIST])
+    side = parameters[4]
     share = parameters[3] * above * side
     torque = share * load
     outputs[TWIST_TORQUE] += torque
@@ -44,7 +43,7 @@ class ThermalStiffness(Effect):
     ``temperature_degc``. What the spring stores less it takes from the drive's heat and gives back: that
     exchange is accounted for as supplied, and is nothing over a cycle at one temperature. Wind-up at a
     constant torque grows by beta for every kelvin: 2.8 arcsec over 20 K for 7.2 arcmin. Springs that effects
-    add in series change with it. A rigid mesh has no spring.
+    add in series change with it, and a hysteresis parallel to it. A rigid mesh has no spring.
     """
 
     title: ClassVar[str] = "temperature-dependent stiffness"
@@ -82,5 +81,6 @@ class ThermalStiffness(Effect):
             self.temperature_degc,
             self.reference_degc,
             self.stiffness_coefficient_per_k,
+            build.twist_sign,
         ]
         build.element(softening, numbers)

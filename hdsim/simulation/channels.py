@@ -95,8 +95,11 @@ class Observer:
                     a.S_TWIST_1 + 2,
                     outputs + MESH_TORQUE,
                     a.S_MESH_1 + 2,
+                    a.S_HELD,
                 ),
-                lambda elastic, twist, lever, mesh, mesh_lever: elastic + twist * lever + mesh * mesh_lever,
+                lambda borne, twist, lever, mesh, mesh_lever, held: (
+                    borne - held + twist * lever + mesh * mesh_lever
+                ),
             ),
             "load_torque": Formula(
                 "N m", "external torque on the output", (outputs + LOAD_TORQUE, a.S_CONSTRAINT + 2), _sum

@@ -23,8 +23,8 @@ ARCSEC = 180.0 * 3600.0 / math.pi
 LEAST = 1.0 / ARCSEC
 #: Periods that have to be seen: fewer may be ringing that dies.
 PERIODS = 3
-#: Least swing of the later half over that of the earlier one: ringing dies faster, from 1 % of the critical
-#: damping on.
+#: Least swing of the last third of the periods over that of the first: ringing dies faster, from 1 % of the
+#: critical damping on. Of periods, each from its own lowest to its highest, so that no drift adds to it.
 KEPT = 0.9
 #: Largest standard deviation of the periods, as a share of their mean.
 REGULAR = 0.25
@@ -67,9 +67,6 @@ def limit_cycle(time: Array, error: Array) -> LimitCycle | None:
     amplitude = 0.5 * (high - low)
     if amplitude < LEAST:
         return None
-    middle = len(x) // 2
-    if np.ptp(x[middle:]) < KEPT * np.ptp(x[:middle]):
-        return None
     y = x - 0.5 * (high + low)
     # A period goes from one rise to the next, with a fall between them: ripples near the middle are none.
     side = np.where(y > 0.3 * amplitude, 1, np.where(y < -0.3 * amplitude, -1, 0))
@@ -78,7 +75,9 @@ def limit_cycle(time: Array, error: Array) -> LimitCycle | None:
     if len(rises) < PERIODS + 1:
         return None
     periods = np.diff(t[rises])
-    if np.std(periods) > REGULAR * np.mean(periods):
+    swings = [float(np.ptp(part)) for part in np.split(x, rises)[1:-1]]
+    third = len(swings) // PERIODS
+    if np.std(periods) > REGULAR * np.mean(periods) or sum(swings[-third:]) < KEPT * sum(swings[:third]):
         return None
     return LimitCycle(amplitude, 1.0 / float(np.mean(periods)), low, high)
 

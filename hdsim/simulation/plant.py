@@ -158,6 +158,7 @@ class Plant:
         found |= {f"{name}_velocity": s[a.S_VELOCITIES + k] for k, name in enumerate(COORDINATES)}
         torque = inputs[TRANSMITTED_TORQUE]
         if not self.model.rigid:
+            torque -= s[a.S_HELD]
             torque += outputs[TWIST_TORQUE] * s[a.S_TWIST_1 + 2] + outputs[MESH_TORQUE] * s[a.S_MESH_1 + 2]
         found["output_torque"] = torque
         found["transmission_error"] = found["output_angle"] - found["motor_angle"] / self.model.ratio

@@ -142,3 +142,45 @@ def test_with_losses_the_audit_closes() -> None:
     assert run.audit.relative < 1e-6
     assert recording["heat"][-1] > 0.01 * run.audit.exchanged
     assert np.all(np.diff(recording["heat"]) >= -1e-9)
+
+
+@pytest.mark.parametrize("mesh", [{"model": "lumped"}, {"model": "teeth"}], ids=["lumped", "teeth"])
+@pytest.mark.parametrize("arrangement", ["circular_spline_fixed", "flexspline_fixed"])
+def test_friction_grows_with_all_that_the_teeth_carry(mesh: dict[str, Any], arrangement: str) -> None:
+    """T_f = (T_c + c_L |tau / i|) sign(w_m), tau with the hysteresis: no damper."""
+    found = build_run(
+        Scenario.model_validate(
+            {
+                "drive": {
+                    "preset": "seed-2021",
+                    "arrangement": arrangement,
+                    "mesh": mesh,
+                    "torsion": {"damping_nm_s_per_rad": 0.0},
+                    "friction": {
+                        "coulomb_nm": 0.05,
+                        "viscous_nm_s_per_rad": 0.0,
+                        "load_coefficient": 0.3,
+                        "smoothing_velocity_rad_per_s": 1e-3,
+                    },
+                },
+                "effects": {"torsional_hysteresis_maxwell": {"slip_torque_nm": 12.0}},
+                "command": {
+                    "motor": {
+                        "type": "motion",
+                        "trajectory": {"type": "sine", "amplitude_deg": 15.0, "frequency_hz": 0.5},
+                    },
+                    "output": {"type": "locked"},
+                },
+                "load": {"inertia_kg_m2": 0.5},
+                "run": {"duration_s": 4.0, "sample_rate_hz": 200, "rtol": 1e-9},
+            }
+        )
+    ).record()
+    speed, torque = found["motor_velocity"], found["output_torque"]
+    ratio = 100.0 if arrangement == "circular_spline_fixed" else 101.0
+    expected = (0.05 + 0.3 * np.abs(torque) / ratio) * np.sign(speed)
+    turning = np.abs(speed) > 0.1
+    assert np.ptp(torque) > 40.0
+    np.testing.assert_allclose(
+        found["input_friction_torque"][turning], expected[turning], atol=0.002 * np.max(expected)
+    )

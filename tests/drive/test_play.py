@@ -173,7 +173,7 @@ def test_the_damper_in_contact_obeys_the_second_law_whatever_its_numbers() -> No
         rate, tau, damping = rng.normal(size=3) * 10 ** rng.uniform(-6, 2, 3) * [1, rng.choice([0, 1]), 1]
         inputs, outputs, jacobian = np.zeros(OWN), np.zeros(OWN), np.zeros(OWN * OWN)
         inputs[TWIST_RATE], inputs[TRANSMITTED_TORQUE] = rate, tau
-        contact_damping.function(inputs, [abs(damping), 0.0], OWN, OWN, outputs, jacobian)
+        contact_damping.function(inputs, [abs(damping)], OWN, OWN, outputs, jacobian)
         assert abs(outputs[TWIST_TORQUE]) <= abs(tau)  # the sum with the spring's torque never pulls
         assert outputs[DISSIPATED] == -outputs[TWIST_TORQUE] * rate >= 0
 
