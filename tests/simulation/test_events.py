@@ -242,6 +242,15 @@ def test_a_swing_at_rest_is_told_however_the_samples_are_cut():
     assert told([])[0].message.endswith("rests since 1.001 s")
 
 
+def test_a_ringing_that_dies_while_the_output_drifts_is_no_limit_cycle():
+    time = np.arange(0.0, 0.3, 5e-4)
+    drift = 3e-4 * np.clip(time - 0.27, 0.0, None)
+    for damping in (0.004, 0.008, 0.015):
+        swing = 2e-5 * np.exp(-damping * 260.0 * time) * np.sin(260.0 * time)
+        assert limit_cycle(time, swing + drift) is None
+    assert limit_cycle(time, 2e-5 * np.sin(260.0 * time)) is not None
+
+
 def test_the_limit_cycle_of_a_loop_over_play_is_the_one_of_an_ode_of_its_own():
     time, angle = play.with_hdsim()
     found = limit_cycle(time, angle - play.REFERENCE)
