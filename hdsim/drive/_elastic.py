@@ -143,8 +143,8 @@ def evaluate_elastic(t, y, integers, reals, scratch, want_jacobian, dy, jacobian
         twist_rate += torsion[a] * seen[a]
         mesh_rate += meshing[a] * seen[a]
     # Of what is parallel to the spring as well: the teeth carry both.
-    transmitted = -result[_mesh_layout.GRADIENT + 2] - held * torsion[2]
     scratch[S_HELD] = -held * torsion[2]
+    transmitted = -result[_mesh_layout.GRADIENT + 2] + scratch[S_HELD]
     fill_inputs(t, integers, scratch, transmitted, twist, twist_rate, mesh_twist, mesh_rate)
     run_elements(integers, reals, scratch, want_jacobian)
 

@@ -173,12 +173,11 @@ def lumped_mesh(angles, error, parameters, result):  # type: ignore[no-untyped-d
                 energy, torque, stiffness = spring(p, at, step, cells, own, 0.0)[0], 0.0, 0.0
                 twist_m = twist_o = twist_mm = twist_mo = twist_oo = 0.0
     if pressed != 0.0:
-        sign = pressed
         for k in range(waves):
             w = int(p[WAVES_AT]) + PER_WAVE * k
             a, b = p[w + 1], p[w + 2]
             angle = a * angles[0] + b * angles[2] + p[w + 3]
-            sine, cosine = sign * p[w] * math.sin(angle), sign * p[w] * math.cos(angle)
+            sine, cosine = pressed * p[w] * math.sin(angle), pressed * p[w] * math.cos(angle)
             twist_m -= a * cosine
             twist_o -= b * cosine
             twist_mm += a * a * sine
