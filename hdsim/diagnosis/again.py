@@ -14,7 +14,7 @@ from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, screen
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
-from hdsim.estimate.orders import Line, lines_of
+from hdsim.estimate.orders import Line, lines_of, power_of
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added
 from hdsim.estimate.unwound import unwound
@@ -190,3 +190,12 @@ def gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:
     first, last, new = (bench.channel_powers(each.predictions) for each in (base, before, now))
     noise = bench.noise_powers
     return max(float((last[c] - new[c]) / max(first[c] - noise[c], noise[c], 1e-300)) for c in first)
+
+
+def part_of_lines(bench: Bench, before: Fit, now: Fit, lines: Sequence[Line]) -> float:
+    """Part of the lines of what was left that a fit explains."""
+    last, new = (
+        power_of(bench, bench.residuals(each.predictions, drift=True), lines, each.state.delays)
+        for each in (before, now)
+    )
+    return float(np.clip(1.0 - new / last, 0.0, 1.0)) if last > 0 else 0.0

@@ -9,13 +9,13 @@ more is found, and all is asked once more when they have explained something.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of
+from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
@@ -31,7 +31,7 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
-from hdsim.estimate.orders import Line, lines_of, power_of
+from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import align, reweigh, together, unlikelihood, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 
@@ -183,6 +183,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
+        known = [replace(one, group=dict(one.group)) for one in found.named[:-1]]
         tell = during("again", "testing each effect again beside the others")
         if current.undetermined:
             current = together(bench, current, rough=True)
@@ -190,6 +191,11 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         current = sharpened(bench, current)
         align(bench, current)
         reweigh(bench, current)
+        left, now = (bench.power(each.predictions) for each in (found.fit, current))
+        if len(found.named) >= len(known) and now >= left:
+            # Names that take each other's place without explaining more would go on doing so.
+            found.named[:] = known
+            return None
     return current
 
 
@@ -246,7 +252,7 @@ def _one_more(
     sharp = named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL)
     if found.named and sharp:
         # Lines stand out of what is left, however little they are beside what was missing and what still is.
-        named.of_lines = _of_lines(bench, current, named.fit, stage.location.lines)
+        named.of_lines = part_of_lines(bench, current, named.fit, stage.location.lines)
         return named
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
     return named if named.gain >= least else None
@@ -330,15 +336,6 @@ def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
         }
         found.append([channel for channel in bench.channels if own[channel] > noise[channel]])
     return found
-
-
-def _of_lines(bench: Bench, before: Fit, now: Fit, lines: Sequence[Line]) -> float:
-    """Part of the lines of what was left that a fit explains."""
-    last, new = (
-        power_of(bench, bench.residuals(each.predictions, drift=True), lines, each.state.delays)
-        for each in (before, now)
-    )
-    return float(np.clip(1.0 - new / last, 0.0, 1.0)) if last > 0 else 0.0
 
 
 def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
