@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Sequence
 
@@ -13,8 +14,9 @@ from hdsim.diagnosis.revise import without
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, screen
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, sharpened
+from hdsim.estimate.fit import Fit, settled, sharpened
 from hdsim.estimate.orders import Line, lines_of, power_of
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added
 from hdsim.estimate.unwound import unwound
@@ -69,9 +71,8 @@ def again(
         if k == len(names) - 1 and settled and not asked:
             break
         own, added = names[k], current.state.added
-        rest = without(bench, current, k)
-        if rest is None or bench.power(rest.predictions) > (1.0 + NEWS) * bench.power(base.predictions):
-            # More than with no effect at all: the fit has failed.
+        rest = _of_the_others(bench, base, current, k)
+        if rest is None:
             if len(names) > 1:
                 k += 1
                 continue
@@ -127,6 +128,16 @@ def again(
             names[k] = own
         k += 1
     return current
+
+
+def _of_the_others(bench: Bench, base: Fit, current: Fit, k: int) -> Fit | None:
+    """The model without an effect; None where its fit fails: it leaves more than the base does alone."""
+    rest, most = without(bench, current, k), (1.0 + NEWS) * bench.power(base.predictions)
+    if rest is not None and len(current.state.added) > 1 and bench.power(rest.predictions) > most:
+        # A rough fit may not come back from numbers that were right beside a strong effect.
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            rest = settled(bench, rest)
+    return rest if rest is not None and bench.power(rest.predictions) <= most else None
 
 
 def as_good(bench: Bench, current: Fit, k: int, rest: Fit) -> Fit | None:

@@ -1,5 +1,6 @@
 """Names that are asked again beside the others: which of two stays that take each other's place."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,19 +46,27 @@ def test_the_simpler_of_two_that_explain_each_other_stays(monkeypatch, first, ne
     assert found is None or [one.effect for one in found.state.added] == [first[0]]
 
 
-@pytest.mark.parametrize("failed", [True, False])
-def test_a_fit_without_one_name_that_leaves_more_than_no_name_has_failed(monkeypatch, failed):
-    """The others alone leave 90 times the noise where no name at all leaves 5: nothing is told by that."""
-    asked = []
+@pytest.mark.parametrize(("rough", "at_its_end"), [(90.0, 80.0), (90.0, 5.0), (5.0, math.nan)])
+def test_a_fit_without_one_name_that_leaves_more_than_no_name_has_failed(monkeypatch, rough, at_its_end):
+    """The others alone leave 80 times the noise where no name at all leaves 5: nothing is told by that.
+
+    A rough fit that leaves so much is carried on first.
+    """
+    asked, failed = [], at_its_end > 5.0
 
     def without(*_):
-        return SimpleNamespace(state=None, predictions=90.0 if failed else 5.0)
+        return SimpleNamespace(state=None, predictions=rough)
+
+    def settled(_, found):
+        assert found.predictions > 5.0
+        return SimpleNamespace(state=None, predictions=at_its_end)
 
     def left_of(*_):
         asked.append(True)
         raise StopIteration
 
     monkeypatch.setattr("hdsim.diagnosis.again.without", without)
+    monkeypatch.setattr("hdsim.diagnosis.again.settled", settled)
     monkeypatch.setattr("hdsim.diagnosis.again.left_of", left_of)
     added = [SimpleNamespace(effect=name, at_limit=False) for name in (FRICTION, RIPPLE)]
     current = SimpleNamespace(state=SimpleNamespace(added=added), predictions=1.0)
