@@ -67,8 +67,8 @@ def again(
         if not asked and _clear(names[k], names[-1]):
             k += 1
             continue
-        settled = bench.power(current.predictions) > (1.0 - NEWS) * first
-        if k == len(names) - 1 and settled and not asked:
+        no_news = bench.power(current.predictions) > (1.0 - NEWS) * first
+        if k == len(names) - 1 and no_news and not asked:
             break
         own, added = names[k], current.state.added
         rest = _of_the_others(bench, base, current, k)

@@ -116,6 +116,9 @@ def test_a_name_gives_way_to_a_look_alike_that_explains_the_rest() -> None:
     assert effect.indistinguishable_from == [DUHEM]
     gap = found.verdict.gap["output_angle"]
     assert gap.after < 4.0 * gap.noise < 0.05 * gap.refit
+    # What nine sliders leave of twelve is asked for in vain, and not in turns.
+    asked = [stage.candidates[0].name for stage in found.evidence.stages if stage.candidates]
+    assert len(asked) == len(set(asked))
 
 
 @pytest.mark.slow
