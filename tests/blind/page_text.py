@@ -137,7 +137,7 @@ new. Their rates had been seen.
 
 - *No rounds of names.* Two laws that take each other's place without explaining more end a search now; a fit
   without one name is carried on before it counts as failed (calibration: `numpy` 8 of seed 124). Pairs of
-  `numpy` are right in 16 of 21 as before, of `toothed` in XX of 11 (was 7), plays of `toothed` in 26 of 31
+  `numpy` are right in 16 of 21 as before, of `toothed` in 7 of 11 as before, plays of `toothed` in 26 of 31
   (was 27; both that changed are weaker than 2 times the noise).
 
 Processor times of the last six rows are up to twice too long: two or three ran at a time on two cores,
