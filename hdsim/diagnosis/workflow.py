@@ -54,6 +54,7 @@ from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
 from hdsim.estimate.thin import readings_of_means
+from hdsim.estimate.unsettled import unsettled
 from hdsim.estimate.write import scenario_changes
 
 if TYPE_CHECKING:
@@ -243,7 +244,7 @@ def _diagnosed(
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
     problems += [*doubts, *beginnings(bench), *one_way(bench), *moving_zeros(bench, current.predictions)]
-    problems += [*unseen(bench, predictions["after"]), *jumped(bench, jumps)]
+    problems += [*unseen(bench, predictions["after"]), *jumped(bench, jumps), *unsettled(bench, current)]
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)

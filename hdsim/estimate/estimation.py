@@ -31,6 +31,7 @@ from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
+from hdsim.estimate.unsettled import unsettled
 from hdsim.estimate.vector import Vector, sensitivities
 from hdsim.estimate.write import scenario_changes
 
@@ -177,6 +178,7 @@ def estimate(
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
     problems += [*beginnings(bench), *one_way(bench), *moving_zeros(bench, found.fit.predictions)]
+    problems += unsettled(bench, found.fit)
     own = found.fit.frees
     covariance, names = found.fit.covariance[: len(own), : len(own)], [each.name for each in own]
     matrix = correlations(covariance)

@@ -48,6 +48,8 @@ class Fit:
         ties: for each undetermined number, those that it cannot be told from.
         beside: sensitivities to the undetermined numbers and then to the zeros of locked records, shape
             (rows, u), and their prior spreads (u,): not knowing them widens the intervals of the others.
+        promised: fall of the cost that the sensitivities promise where it ended, in units of what an
+            independent sample of the residual adds; 0 of a rough fit, which has none there.
     """
 
     state: State
@@ -59,6 +61,7 @@ class Fit:
     undetermined: list[Free]
     ties: dict[str, list[str]]
     beside: tuple[Array, Array] | None = None
+    promised: float = 0.0
 
     def numbers_of(self, effect: int) -> slice:
         """Where the numbers of an effect of ``state.added`` stand among all free numbers."""
@@ -167,6 +170,7 @@ def fit(
     own = len(chosen)
     columns = np.hstack([found.columns[:, :own] / vector.rates(found.x), found.columns[:, own:]])
     priors = problem.priors
+    promised = found.promised * power / sample_power(found.rest, problem.blocks)
     covariance = (
         np.diag(priors**2)
         if rough
@@ -174,7 +178,7 @@ def fit(
     )
     return Fit(
         vector.state(found.x), chosen, vector.logarithms(found.x), covariance,
-        problem.predicted(found.x), columns, undetermined, ties, beside,
+        problem.predicted(found.x), columns, undetermined, ties, beside, promised,
     )  # fmt: skip
 
 

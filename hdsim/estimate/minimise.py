@@ -26,11 +26,14 @@ class Minimum:
         x: shape (p,).
         rest: the residual there, shape (rows,).
         columns: sensitivities there, shape (rows, p).
+        promised: fall of the cost that they promise there, in units of what one independent sample adds;
+            not known of a rough fit.
     """
 
     x: Array
     rest: Array
     columns: Array
+    promised: float = 0.0
 
 
 def minimised(
@@ -97,6 +100,7 @@ def minimised(
         small = whole(x, slopes.at(x))
         return _turned(small[:, :-1], small[:, -1])
 
+    promised = 0.0
     for _ in range(1 if rough else rounds):
         found = least_squares(
             values,
@@ -118,11 +122,11 @@ def minimised(
         small = whole(found.x, columns)
         free, rest = found.active_mask == 0, small[:, -1]
         step, *_ = np.linalg.lstsq(small[:, :-1][:, free], -rest, rcond=None)
-        promised = np.sum(rest**2) - np.sum((rest + small[:, :-1][:, free] @ step) ** 2)
+        promised = float(np.sum(rest**2) - np.sum((rest + small[:, :-1][:, free] @ step) ** 2))
         if promised < tight:
             break
         x0 = found.x
-    return Minimum(found.x, residual(found.x), columns)
+    return Minimum(found.x, residual(found.x), columns, promised)
 
 
 def _turned(columns: Array, values: Array) -> Array:

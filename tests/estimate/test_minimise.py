@@ -44,6 +44,23 @@ def test_the_optimum_is_that_of_the_long_residual_and_the_priors(most):
     np.testing.assert_allclose(found.rest, problem.residual(found.x))
 
 
+class Ragged(Decay):
+    """The same, where each step beside the start adds what no slope tells of."""
+
+    def residual(self, x):
+        return super().residual(x) + 10.0 * abs(np.sin(1e5 * float(np.sum(x - self.start))))
+
+
+def test_only_where_no_step_keeps_what_the_slopes_promise_is_any_of_it_left():
+    power = 0.05**2
+    smooth, ragged = (minimised(each, each.start, each.start, power) for each in (Decay(), Ragged()))
+    assert smooth.promised < 0.25
+    assert np.max(np.abs(ragged.x - Ragged.start)) < 1e-3
+    # All that the data have against the start, but for what the priors keep of it.
+    fall = (np.sum(ragged.rest**2) - np.sum(smooth.rest**2)) / power
+    assert ragged.promised == pytest.approx(fall, rel=0.3)
+
+
 @pytest.mark.parametrize("values", [RNG.standard_normal(6), np.eye(6)[-1]])
 def test_turning_keeps_every_product(values):
     columns = RNG.standard_normal((6, 4))
