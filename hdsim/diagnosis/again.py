@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable, Iterable, Sequence
 
@@ -10,13 +9,12 @@ import numpy as np
 
 from hdsim.diagnosis.contest import confusable
 from hdsim.diagnosis.name import SAME, Named, freedom, level, name_effect
-from hdsim.diagnosis.revise import without
+from hdsim.diagnosis.revise import carried_on, without
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import Screening, screen
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, settled, sharpened
+from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.orders import Line, lines_of, power_of
-from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added
 from hdsim.estimate.unwound import unwound
@@ -133,11 +131,12 @@ def again(
 def _of_the_others(bench: Bench, base: Fit, current: Fit, k: int) -> Fit | None:
     """The model without an effect; None where its fit fails: it leaves more than the base does alone."""
     rest, most = without(bench, current, k), (1.0 + NEWS) * bench.power(base.predictions)
-    if rest is not None and len(current.state.added) > 1 and bench.power(rest.predictions) > most:
+    if rest is None or bench.power(rest.predictions) <= most:
+        return rest
+    if len(current.state.added) > 1:
         # A rough fit may not come back from numbers that were right beside a strong effect.
-        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-            rest = settled(bench, rest)
-    return rest if rest is not None and bench.power(rest.predictions) <= most else None
+        rest = carried_on(bench, rest)
+    return rest if bench.power(rest.predictions) <= most else None
 
 
 def as_good(bench: Bench, current: Fit, k: int, rest: Fit) -> Fit | None:

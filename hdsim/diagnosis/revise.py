@@ -108,8 +108,7 @@ def _least_needed(bench: Bench, current: Fit, named: Sequence[Named], others: li
     for k in rough:
         rest = others[k]
         if rest is not None and named[k].needed >= NEEDLESS:
-            with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-                others[k] = rest = settled(bench, rest)
+            others[k] = rest = carried_on(bench, rest)
             named[k].needed = needed(bench, rest, current)
         if named[k].needed < NEEDLESS:
             return k
@@ -201,6 +200,13 @@ def without(bench: Bench, current: Fit, k: int, *, made_up: bool = False) -> Fit
         return fit(bench, gone.state, gone.frees, prune=False, after=gone, known=known, lost=lost, rough=True)
     except (PredictionError, np.linalg.LinAlgError):
         return None
+
+
+def carried_on(bench: Bench, found: Fit) -> Fit:
+    """A rough fit at its end, or as it is where that fails."""
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        return settled(bench, found)
+    return found
 
 
 def needed(bench: Bench, less: Fit, whole: Fit) -> float:

@@ -66,7 +66,7 @@ def test_a_fit_without_one_name_that_leaves_more_than_no_name_has_failed(monkeyp
         raise StopIteration
 
     monkeypatch.setattr("hdsim.diagnosis.again.without", without)
-    monkeypatch.setattr("hdsim.diagnosis.again.settled", settled)
+    monkeypatch.setattr("hdsim.diagnosis.revise.settled", settled)
     monkeypatch.setattr("hdsim.diagnosis.again.left_of", left_of)
     added = [SimpleNamespace(effect=name, at_limit=False) for name in (FRICTION, RIPPLE)]
     current = SimpleNamespace(state=SimpleNamespace(added=added), predictions=1.0)
