@@ -8,26 +8,28 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, model_validator
 
 from hdsim.effects._fitting import Amplitude, Fitting, Plausible, Shape
+from hdsim.effects.stribeck_friction import STRIBECK_EXPONENT
 from hdsim.kernel import DISSIPATED, INPUT_FRICTION, MOTOR_TORQUE, MOTOR_VELOCITY, STORED, element
 from hdsim.parts import INPUT_FRICTION_HEAT, Builder, Effect, InputFriction, Signature, State
 
 
 @element
 def bristles(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
-    """LuGre friction on the motor. Parameters: s_0, s_1, s_2, T_c, T_s, v_s, v_d; own state: z, rad."""
+    """LuGre friction on the motor. Parameters: s_0, s_1, s_2, T_c, T_s, v_s, v_d, d; own state: z, rad."""
     s0 = parameters[0]
     speed = inputs[MOTOR_VELOCITY]
     z = inputs[own]
     magnitude = abs(speed)
     direction = math.copysign(1.0, speed)
 
-    scaled = speed / parameters[5]
-    bump = (parameters[4] - parameters[3]) * math.exp(-scaled * scaled)
+    power = math.pow(magnitude / parameters[5], parameters[7])
+    bump = (parameters[4] - parameters[3]) * math.exp(-power)
     level = parameters[3] + bump
-    level_w = -2.0 * scaled / parameters[5] * bump
+    # |w| times the level's slope: at rest the slope alone has no limit where d < 1.
+    falls = -parameters[7] * power * bump * direction
     rate = speed - s0 * magnitude * z / level
     rate_z = -s0 * magnitude / level
-    rate_w = 1.0 - s0 * direction * z / level + s0 * magnitude * z * level_w / (level * level)
+    rate_w = 1.0 - s0 * direction * z / level + s0 * z * falls / (level * level)
 
     fading = speed / parameters[6]
     s1 = parameters[1] * math.exp(-fading * fading)
@@ -49,8 +51,22 @@ def bristles(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any,
     outputs[INPUT_FRICTION] += torque
 
 
+def _way(label: str, *further: Shape) -> Fitting:
+    return Fitting(
+        (Amplitude({"coulomb_nm": 0.02, "static_nm": 0.0201}), Amplitude({"static_nm": 0.02})),
+        (
+            Shape("stribeck_velocity_rad_per_s", (2.0, 8.0), most=25.0),
+            Shape("stiffness_nm_per_rad", (6.0,)),
+            *further,
+        ),
+        {"damping_nm_s_per_rad": 1e-3},
+        label=label,
+        cumulative=True,
+    )
+
+
 class LugreFriction(Effect):
-    """T = -(s_0 z + s_1(w) z' + s_2 w), z' = w - s_0 |w| z / g(w), g = T_c + (T_s - T_c) exp(-(w/v_s)^2).
+    """T = -(s_0 z + s_1(w) z' + s_2 w), z' = w - s_0 |w| z / g(w), g = T_c + (T_s - T_c) exp(-|w/v_s|^d).
 
     It replaces the drive's Coulomb friction: set the drive's own to zero, or it counts twice.
     The stored energy is s_0 z^2/2, and the heat, power in minus its rate, is with s = s_0 z sign(w)/g
@@ -66,6 +82,7 @@ class LugreFriction(Effect):
     source: ClassVar[str] = (
         "Canudas de Wit, Olsson, Astrom and Lischinsky 1995, IEEE Trans. Automatic Control 40:419; "
         "passivity: Barabanov and Ortega 2000, IEEE TAC 45:830; fading s_1: Olsson 1996, thesis, Lund; "
+        "exponent d: as of stribeck_friction; "
         "default numbers are estimates around T_c = 32 mN m and a presliding displacement of 3 mrad"
     )
     signature: ClassVar[Signature] = Signature(
@@ -79,17 +96,8 @@ class LugreFriction(Effect):
         },
     )
     adds_to: ClassVar[tuple[tuple[str, str], ...]] = (("coulomb_nm", "friction.coulomb_nm"),)
-    fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting(
-            (Amplitude({"coulomb_nm": 0.02, "static_nm": 0.0201}), Amplitude({"static_nm": 0.02})),
-            (
-                Shape("stribeck_velocity_rad_per_s", (2.0, 8.0), most=25.0),
-                Shape("stiffness_nm_per_rad", (6.0,)),
-            ),
-            {"damping_nm_s_per_rad": 1e-3},
-            cumulative=True,
-        ),
-    )
+    fittings: ClassVar[tuple[Fitting, ...]] = (_way(""),)
+    finer: ClassVar[tuple[Fitting, ...]] = (_way("of another exponent", STRIBECK_EXPONENT),)
 
     stiffness_nm_per_rad: Annotated[
         float,
@@ -114,6 +122,10 @@ class LugreFriction(Effect):
         float, Plausible(1.0, 10.0, "estimate in the literature of drives: 1 to 10 rad/s of the motor")
     ] = Field(5.0, gt=0)
     """Stribeck speed v_s of the motor, rad/s."""
+    stribeck_exponent: Annotated[float, Plausible(0.5, 2.0, "as of stribeck_friction")] = Field(
+        2.0, gt=0, le=10
+    )
+    """Exponent d of the Stribeck curve: 2 for the Gaussian form, 1 for Tustin's."""
     damping_velocity_rad_per_s: float | None = Field(None, gt=0)
     """Speed v_d over which the bristle damping fades, rad/s (null: v_s, or less as passivity asks)."""
 
@@ -144,6 +156,7 @@ class LugreFriction(Effect):
         )
         numbers = [self.stiffness_nm_per_rad, self.damping_nm_s_per_rad, self.viscous_nm_s_per_rad]
         numbers += [self.coulomb_nm, self.static_nm, self.stribeck_velocity_rad_per_s, fading]
+        numbers.append(self.stribeck_exponent)
         size = self.static_nm / self.stiffness_nm_per_rad
         state = State(
             "bristle_deflection", "rad", 0.0, size, "mean deflection of the LuGre bristles, motor shaft"

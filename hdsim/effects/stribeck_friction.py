@@ -15,13 +15,15 @@ from hdsim.parts import Builder, Effect, Signature
 
 @element
 def stribeck(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any, jacobian: Any) -> None:
-    """T = -dT exp(-(w/v_s)^2) tanh(w/w_s) on the motor. Parameters: dT, v_s, w_s."""
+    """T = -dT exp(-|w/v_s|^d) tanh(w/w_s) on the motor. Parameters: dT, v_s, w_s, d."""
     speed = inputs[MOTOR_VELOCITY]
-    scaled = speed / parameters[1]
-    level = parameters[0] * math.exp(-scaled * scaled)
+    power = math.pow(abs(speed) / parameters[1], parameters[3])
+    level = parameters[0] * math.exp(-power)
     sign = math.tanh(speed / parameters[2])
     torque = level * sign
-    slope = level * ((1.0 - sign * sign) / parameters[2] - 2.0 * scaled / parameters[1] * sign)
+    # At rest the sign's slope is all: |w|^(d - 1) tanh(w/w_s) vanishes there for any d.
+    falls = parameters[3] * power / speed if speed != 0.0 else 0.0
+    slope = level * ((1.0 - sign * sign) / parameters[2] - falls * sign)
     outputs[MOTOR_TORQUE] -= torque
     jacobian[MOTOR_TORQUE * columns + MOTOR_VELOCITY] -= slope
     outputs[DISSIPATED] += torque * speed
@@ -29,13 +31,25 @@ def stribeck(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any,
     outputs[INPUT_FRICTION] += torque
 
 
+#: Exponent of a finer formula: as sharp as the field's own range allows, or as flat.
+STRIBECK_EXPONENT = Shape("stribeck_exponent", (0.8, 1.3), least=0.4, most=3.0)
+_TERMS = (Amplitude({"extra_static_nm": 0.008}),)
+# Ten at most in the sources; a fall over more speed is another law of the viscous friction.
+_SPEED = Shape("stribeck_velocity_rad_per_s", (1.5, 5.0, 14.0), most=15.0)
+
+
 class StribeckFriction(Effect):
-    """T = -(T_s - T_c) exp(-(w_m/v_s)^2) tanh(w_m/w_s), on top of the drive's Coulomb friction T_c."""
+    """T = -(T_s - T_c) exp(-|w_m/v_s|^d) tanh(w_m/w_s), on top of the drive's Coulomb friction T_c.
+
+    The exponent d tells how sharply the film builds: 2 is the Gaussian form, 1 Tustin's, 0.5 to 1 what Bo and
+    Pavelescu measured. Any d > 0 brakes.
+    """
 
     title: ClassVar[str] = "Stribeck friction"
     source: ClassVar[str] = (
         "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30:1083 (Gaussian form of Tustin's "
-        "curve); v_s of 1-10 rad/s and T_s/T_c of 1-1.5 are estimates"
+        "curve); exponents of 0.5 to 1: Bo and Pavelescu 1982, Wear 82:277; v_s of 1-10 rad/s and T_s/T_c of "
+        "1-1.5 are estimates"
     )
     signature: ClassVar[Signature] = Signature(
         lives_in=("velocity", "direction"),
@@ -47,12 +61,9 @@ class StribeckFriction(Effect):
             "and slip",
         },
     )
-    fittings: ClassVar[tuple[Fitting, ...]] = (
-        Fitting(
-            (Amplitude({"extra_static_nm": 0.008}),),
-            # Ten at most in the sources; a fall over more speed is another law of the viscous friction.
-            (Shape("stribeck_velocity_rad_per_s", (1.5, 5.0, 14.0), most=15.0),),
-        ),
+    fittings: ClassVar[tuple[Fitting, ...]] = (Fitting(_TERMS, (_SPEED,)),)
+    finer: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(_TERMS, (_SPEED, STRIBECK_EXPONENT), label="of another exponent"),
     )
 
     extra_static_nm: Annotated[
@@ -63,6 +74,10 @@ class StribeckFriction(Effect):
         float, Plausible(1.0, 10.0, "estimate in the literature of drives: 1 to 10 rad/s of the motor")
     ] = Field(5.0, gt=0)
     """Motor speed v_s over which the extra friction decays, rad/s."""
+    stribeck_exponent: Annotated[
+        float, Plausible(0.5, 2.0, "0.5 to 1 (Bo and Pavelescu), 1 (Tustin), 2 (Gaussian)")
+    ] = Field(2.0, gt=0, le=10)
+    """Exponent d of the decay: 2 for the Gaussian form, 1 for Tustin's."""
     smoothing_velocity_rad_per_s: Annotated[float, FIXED] = Field(0.5, gt=0)
     """Motor speed w_s over which the sign is smoothed, rad/s; well below v_s, or the bump is lost."""
 
@@ -70,5 +85,10 @@ class StribeckFriction(Effect):
         """Add the bump to the motor's friction."""
         build.element(
             stribeck,
-            [self.extra_static_nm, self.stribeck_velocity_rad_per_s, self.smoothing_velocity_rad_per_s],
+            [
+                self.extra_static_nm,
+                self.stribeck_velocity_rad_per_s,
+                self.smoothing_velocity_rad_per_s,
+                self.stribeck_exponent,
+            ],
         )

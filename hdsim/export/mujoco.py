@@ -74,22 +74,23 @@ def mjcf(scenario: Scenario, *, weigh: bool = False) -> tuple[str, tuple[Lost, .
     lost: list[Lost] = []
     frictions = [(drive.friction.coulomb_nm, drive.friction.viscous_nm_s_per_rad)]
     weighing = Weighing(scenario)
-    growing = drive.friction.load_coefficient
+    losses: list[LoadDependentLoss] = []
     for name, effect in scenario.effects.active().items():
         without: dict[str, Any] = {f"effects.{name}": None}
         probe = Probe(scenario, effect)
         if probe.only_friction:
             frictions += [(f.coulomb_nm, f.viscous_nm_s_per_rad) for f in probe.frictions]
         elif isinstance(effect, LoadDependentLoss):
-            growing += effect.mean_coefficient
+            losses.append(effect)
         elif not probe.only_spring:
             lost.append(Lost(f"effect {name}: {effect.title}", "nothing", name != "sensors", without))
-    if growing > 0:
+    if drive.friction.load_coefficient > 0 or losses:
         # MJCF has no friction that grows with a torque: that of the mean stands in for it.
         mean = weighing.mean_torque_nm
-        frictions.append((growing * mean / abs(drive.ratio), 0.0))
+        lossy = drive.friction.load_coefficient * mean + sum(one.loss_nm(mean) for one in losses)
+        frictions.append((lossy / abs(drive.ratio), 0.0))
         without = {"drive.friction.load_coefficient": 0.0}
-        if scenario.effects.active().keys() & {"load_dependent_loss"}:
+        if losses:
             without["effects.load_dependent_loss"] = None
         told = f"friction of the mean torque, {mean:.3g} N m"
         lost.append(Lost("friction that grows with the load", told, without=without))

@@ -1,4 +1,4 @@
-"""Friction over an angle that has its name, with multiples of its orders where the data tell them.
+"""Friction that has its name, in a finer formula where the data tell it: over an angle, speed or load.
 
 Friction that is tight over a part of the turn is no sine of it. Of an exponential of a sine every multiple is
 known (Jacobi and Anger): exp(sin u) = I0(1) + 2 I1(1) sin u - 2 I2(1) cos 2u - 2 I3(1) sin 3u + ...
@@ -85,5 +85,52 @@ def test_a_finer_formula_begins_as_the_plain_one_of_the_same_turn_is(plain: Fitt
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_a_sine_of_the_angle_stays_one(tmp_path: Any, kind: str) -> None:
     bench, base, plain = plainly_named(tmp_path, kind, lambda u: 1.0 + np.sin(u))
+    assert beyond(bench, plain) < 0.05
+    assert refined(bench, base, plain, lambda _: None) is plain
+
+
+#: How the extra friction fades, over the speed by the Stribeck speed: not the Gaussian of the plain formula.
+FADING = {
+    "Tustin": lambda x: np.exp(-np.abs(x)),
+    "Hess and Soom": lambda x: 1.0 / (1.0 + x * x),
+    "Gaussian": lambda x: np.exp(-x * x),
+}
+
+
+def stribeck_named(tmp_path: Any, law: Any) -> tuple[Bench, Fit, Fit]:
+    """A rigid drive's log with static friction that fades, the base, and that with the plain effect."""
+    record = rigid_record(
+        20.0,
+        noise=5e-4,
+        extra=lambda angle, velocity: 0.02 * law(velocity / 5.0) * np.tanh(velocity / 0.5),
+    )
+    base = scenario(tmp_path)
+    bench = bench_for([record], [], base, None)
+    found = refit(bench, state_of(base)).fit
+    [plain] = catalogue()["stribeck_friction"].fittings
+    added = min(starts("stribeck_friction", plain, (), {}), key=lambda one: abs(one.shapes[0] - 5.0))
+    return bench, found, with_effects(bench, found, added)
+
+
+def test_the_exponent_of_a_fading_static_friction_is_told(tmp_path: Any) -> None:
+    bench, base, plain = stribeck_named(tmp_path, FADING["Tustin"])
+    found = together(bench, refined(bench, base, plain, lambda _: None))
+    own = found.state.added[0].settings()
+    assert beyond(bench, plain) > 0.2
+    assert beyond(bench, found) < 0.02
+    assert own["stribeck_exponent"] == pytest.approx(1.0, rel=0.1)
+    assert own["stribeck_velocity_rad_per_s"] == pytest.approx(5.0, rel=0.1)
+    assert own["extra_static_nm"] == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_law_that_is_no_exponential_is_met_more_closely_by_another_exponent(tmp_path: Any) -> None:
+    bench, base, plain = stribeck_named(tmp_path, FADING["Hess and Soom"])
+    found = together(bench, refined(bench, base, plain, lambda _: None))
+    assert beyond(bench, found) < 0.25 * beyond(bench, plain)
+    assert found.state.added[0].settings()["stribeck_exponent"] < 1.7
+
+
+def test_a_gaussian_stays_one(tmp_path: Any) -> None:
+    bench, base, plain = stribeck_named(tmp_path, FADING["Gaussian"])
     assert beyond(bench, plain) < 0.05
     assert refined(bench, base, plain, lambda _: None) is plain

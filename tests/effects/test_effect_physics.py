@@ -123,16 +123,58 @@ def test_stribeck_bump_peaks_near_static_friction_and_vanishes_at_speed() -> Non
     assert np.allclose(torque, 0.01 * np.exp(-((speeds / 5) ** 2)), rtol=1e-6, atol=1e-20)
 
 
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 1.7])
+def test_the_stribeck_bump_of_any_exponent_is_the_general_exponential(exponent: float) -> None:
+    effect = StribeckFriction(
+        extra_static_nm=0.01, stribeck_velocity_rad_per_s=5, stribeck_exponent=exponent,
+        smoothing_velocity_rad_per_s=1e-4,
+    )  # fmt: skip
+    model = Alone(effect)
+    for speed in (0.01, -3.0, 5.0, 40.0):
+        expected = math.copysign(0.01 * math.exp(-((abs(speed) / 5) ** exponent)), speed)
+        assert at(model, MOTOR_VELOCITY=speed)[k.INPUT_FRICTION] == pytest.approx(expected, rel=1e-9)
+    assert at(model, MOTOR_VELOCITY=0.0)[k.INPUT_FRICTION] == 0.0
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.3, 3.0])
+@pytest.mark.parametrize("speed", [-0.02, 0.3, 7.0])
+def test_slopes_of_friction_with_an_exponent_are_those_of_differences(exponent: float, speed: float) -> None:
+    kinds = [
+        StribeckFriction(stribeck_exponent=exponent),
+        LugreFriction(stribeck_exponent=exponent),
+        LoadDependentLoss(load_exponent=min(exponent, 2.0)),
+    ]
+    for effect in kinds:
+        model = Alone(effect)
+        inputs = model.initial
+        inputs[k.MOTOR_VELOCITY], inputs[k.TRANSMITTED_TORQUE] = speed, -3.0
+        inputs[k.OWN :] = 1e-3
+        slopes = model(inputs)[1]
+        for column in (k.MOTOR_VELOCITY, k.TRANSMITTED_TORQUE):
+            ahead, behind, step = inputs.copy(), inputs.copy(), 1e-6
+            ahead[column], behind[column] = inputs[column] + step, inputs[column] - step
+            expected = (model(ahead)[0] - model(behind)[0]) / (2 * step)
+            expected[k.INPUT_FRICTION] = 0.0  # an output of its own: no equation depends on it
+            assert slopes[:, column] == pytest.approx(expected, rel=1e-5, abs=1e-8)
+
+
+def test_friction_with_an_exponent_has_a_slope_at_rest() -> None:
+    for effect in (StribeckFriction(stribeck_exponent=0.5), LugreFriction(stribeck_exponent=0.5)):
+        model = Alone(effect)
+        assert np.all(np.isfinite(model(model.initial)[1]))
+
+
+@pytest.mark.parametrize("exponent", [0.6, 2.0])
 @pytest.mark.parametrize("speed", [0.05, 2.0, -8.0, 60.0])
-def test_lugre_settles_on_the_stribeck_curve_at_any_steady_speed(speed: float) -> None:
-    effect = LugreFriction(viscous_nm_s_per_rad=1e-3)
+def test_lugre_settles_on_the_stribeck_curve_at_any_steady_speed(speed: float, exponent: float) -> None:
+    effect = LugreFriction(viscous_nm_s_per_rad=1e-3, stribeck_exponent=exponent)
     model = Alone(effect)
     slide = 40 * effect.static_nm / effect.stiffness_nm_per_rad
     times = np.linspace(0, slide / abs(speed), 50)
     z = model.follow(k.MOTOR_ANGLE, lambda t: speed * t, lambda t: speed, times)[0, -1]
     inputs = model.initial
     inputs[k.MOTOR_VELOCITY], inputs[k.OWN] = speed, z
-    level = 0.032 + 0.008 * math.exp(-((speed / 5) ** 2))
+    level = 0.032 + 0.008 * math.exp(-((abs(speed) / 5) ** exponent))
     expected = -(math.copysign(level, speed) + 1e-3 * speed)
     assert model(inputs)[0][k.MOTOR_TORQUE] == pytest.approx(expected, rel=1e-6)
 
@@ -367,6 +409,17 @@ def test_load_dependent_loss_is_a_share_of_the_load_in_both_directions_of_power(
         for speed in (100.0, -100.0):
             torque = at(model, TRANSMITTED_TORQUE=load, MOTOR_VELOCITY=speed)[k.MOTOR_TORQUE]
             assert torque == pytest.approx(-math.copysign(0.05 * 52 / 100, speed), rel=0.02)
+
+
+def test_a_loss_with_an_exponent_is_that_power_of_the_torque_and_its_share_at_the_reference() -> None:
+    # A mesh's coefficient of friction goes with its force to the 0.2 (ISO/TR 14179-2).
+    effect = LoadDependentLoss(coefficient=0.05, load_exponent=1.2, smoothing_torque_nm=1e-3)
+    model = Alone(effect)
+    for load in (13.0, -52.0, 104.0):
+        torque = -at(model, TRANSMITTED_TORQUE=load, MOTOR_VELOCITY=90.0)[k.MOTOR_TORQUE]
+        assert torque == pytest.approx(0.05 * 52.0 * (abs(load) / 52.0) ** 1.2 / 100, rel=1e-3)
+        assert effect.loss_nm(abs(load)) == pytest.approx(100 * torque, rel=1e-3)
+    assert effect.loss_nm(0.0) == 0.0
 
 
 def test_cubic_spring_is_the_derivative_of_its_energy() -> None:
