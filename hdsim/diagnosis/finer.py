@@ -120,6 +120,8 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
             continue
+        if bench.measured.intersection(fitting.unless):
+            continue
         if label == fitting.label or (fitting.refines and label not in fitting.refines):
             continue
         begun = set()

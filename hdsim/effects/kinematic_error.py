@@ -124,6 +124,27 @@ class KinematicError(Effect):
         ),
     )
 
+    #: Without an output's encoder no order spectrum shows which orders there are.
+    finer: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            Harmonic.components("amplitude_arcmin", 0.1, 5),
+            label="with multiples of its orders",
+            turns=1.0,
+            settings={
+                "components": [
+                    {"order": 2, "per": "wave_generator_turn"},
+                    {"order": 2, "per": "relative_turn"},
+                    {"order": 4, "per": "wave_generator_turn"},
+                    {"order": 6, "per": "wave_generator_turn"},
+                    {"order": 4, "per": "relative_turn"},
+                ]
+            },
+            unless=("output_angle",),
+            lives_in=("wave_generator_angle",),
+            refines=("",),
+        ),
+    )
+
     components: tuple[ErrorComponent, ...] = Field(default_factory=_default_components, min_length=1)
     """The harmonics."""
 
