@@ -42,9 +42,16 @@ class Guard:
 
 
 def speed_guard(model: Model) -> Guard | None:
-    """The guard over the speed of the motor, or of the output where the motor's motion is prescribed."""
-    at = model.place_of.get("motor", model.place_of.get("output"))
-    return None if at is None else Guard(at + 1, FASTEST, state_names(model)[at + 1])
+    """The guard over the speed of the motor, or of the output where the motor's motion is prescribed.
+
+    The output's limit is the same speed behind an ideal gear: errors of the teeth that turned faster would be
+    followed period by period, for minutes.
+    """
+    side = "motor" if "motor" in model.place_of else "output"
+    if side not in model.place_of:
+        return None
+    at = model.place_of[side] + 1
+    return Guard(at, FASTEST if side == "motor" else FASTEST / abs(model.ratio), state_names(model)[at])
 
 
 def state_names(model: Model) -> list[str]:

@@ -153,3 +153,12 @@ def test_a_motion_beyond_any_drive_is_a_failure_and_not_a_prediction():
 def test_a_channel_that_there_is_not_is_refused_by_name():
     with pytest.raises(InputError, match="no channel 'speed'; there are: motor_angle"):
         sample(model_of({}), np.arange(0.0, DURATION, 1 / RATE), ("speed",))
+
+
+def test_a_load_that_runs_away_behind_a_prescribed_motor_is_given_up_before_its_teeth_are_followed():
+    """Teeth whose stiffness is below zero over a part of the turn: no drive, but what a search may try."""
+    uneven = [{"order": 2, "stiffness_nm_per_rad": 4e4, "per": "relative_turn"}]
+    effects = {"load_dependent_kinematic_error": {"components": uneven}, "kinematic_error": {}}
+    # The motor's limit of 1e5 rad/s, behind a ratio of 100.
+    with pytest.raises(RunFailed, match=r"output less ideal velocity \(rad/s\) exceeds 1000\b"):
+        sample(model_of(effects, audited=False), np.arange(0.0, DURATION, 1 / RATE), CHANNELS, rtol=3e-5)
