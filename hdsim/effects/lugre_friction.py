@@ -97,7 +97,7 @@ class LugreFriction(Effect):
     )
     adds_to: ClassVar[tuple[tuple[str, str], ...]] = (("coulomb_nm", "friction.coulomb_nm"),)
     fittings: ClassVar[tuple[Fitting, ...]] = (_way(""),)
-    finer: ClassVar[tuple[Fitting, ...]] = (_way("of another exponent", STRIBECK_EXPONENT),)
+    finer: ClassVar[tuple[Fitting, ...]] = (_way("whose exponent is not 2", STRIBECK_EXPONENT),)
 
     stiffness_nm_per_rad: Annotated[
         float,

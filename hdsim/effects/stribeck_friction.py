@@ -31,7 +31,7 @@ def stribeck(inputs: Any, parameters: Any, own: int, columns: int, outputs: Any,
     outputs[INPUT_FRICTION] += torque
 
 
-#: Exponent of a finer formula: as sharp as the field's own range allows, or as flat.
+#: Exponent of a finer formula: a little beyond what sources have, so that their ends are no ends of a fit.
 STRIBECK_EXPONENT = Shape("stribeck_exponent", (0.8, 1.3), least=0.4, most=3.0)
 _TERMS = (Amplitude({"extra_static_nm": 0.008}),)
 # Ten at most in the sources; a fall over more speed is another law of the viscous friction.
@@ -63,7 +63,7 @@ class StribeckFriction(Effect):
     )
     fittings: ClassVar[tuple[Fitting, ...]] = (Fitting(_TERMS, (_SPEED,)),)
     finer: ClassVar[tuple[Fitting, ...]] = (
-        Fitting(_TERMS, (_SPEED, STRIBECK_EXPONENT), label="of another exponent"),
+        Fitting(_TERMS, (_SPEED, STRIBECK_EXPONENT), label="whose exponent is not 2"),
     )
 
     extra_static_nm: Annotated[
