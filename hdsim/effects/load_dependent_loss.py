@@ -93,6 +93,8 @@ class LoadDependentLoss(Effect):
         Fitting(
             (Amplitude({"coefficient": 0.03}),),
             (Shape("load_exponent", (0.85, 1.2), least=0.6, most=1.7),),
+            # Stated, as another drive's default is another torque.
+            {"reference_torque_nm": 52.0},
             label="that does not grow in proportion to the load",
             refines=("",),
         ),

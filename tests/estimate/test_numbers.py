@@ -11,6 +11,7 @@ import hdsim.parts
 from hdsim import number
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Amplitude, Fitting, Harmonic, Inverse, Periodic, Shape
+from hdsim.effects._sizes import SIZE_20_100, sized_defaults
 from hdsim.estimate.found import ParameterEstimate
 from hdsim.estimate.numbers import Free, base_freedoms, scaled, undeclared
 from hdsim.estimate.state import Added, number_at, state_of
@@ -18,6 +19,7 @@ from hdsim.estimate.vector import Vector
 from hdsim.number import FIXED, Number
 from hdsim.scenario.fields import split_unit
 from hdsim.tell.tables import numbers_table
+from hdsim.testing.alone import Alone
 
 BASE = """
 name: base
@@ -114,6 +116,19 @@ def test_every_fitted_field_is_told_in_its_unit(name, fitting):
         row = numbers_table({path: ParameterEstimate(value=one.value)}).replace("μ", "µ")
         assert f"<td class='u'>{UNITS[last]}</td>" in row, path
         assert math.isnan(one.low) or one.low <= one.value <= one.high
+
+
+@pytest.mark.parametrize(("name", "fitting"), ALL, ids=[f"{n} {f.label}".strip() for n, f in ALL])
+def test_what_a_fit_writes_is_the_same_effect_on_a_drive_of_another_size(name, fitting):
+    """A scenario fills what is left open with what fits its drive; a fit has it as it is."""
+    kind, written = catalogue()[name], at_unit(name, fitting).settings()
+    larger = replace(SIZE_20_100, rated_torque_nm=216.0, ratio=-80.0, stiffness_k1_nm_per_rad=7e4)
+    filled = sized_defaults(kind, written, larger)
+    fitted, read = Alone(kind(**written)), Alone(kind(**written | filled))
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        inputs = fitted.initial + rng.standard_normal(len(fitted.initial))
+        assert np.array_equal(fitted(inputs)[0], read(inputs)[0], equal_nan=True)
 
 
 def test_numbers_are_found_at_their_fields_with_unit_and_bounds(tmp_path):
