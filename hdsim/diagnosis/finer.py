@@ -117,10 +117,11 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
         for shape, value in zip(plain.fitting.shapes, plain.shapes, strict=True)
     }
     label, settings = plain.fitting.label, plain.settings()
+    measured = bench.measured
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
             continue
-        if bench.measured.intersection(fitting.unless):
+        if not fitting.of_channels(measured):
             continue
         if label == fitting.label or (fitting.refines and label not in fitting.refines):
             continue

@@ -118,7 +118,7 @@ def screen(
                 continue
             if not fitting.of_mesh(state.toothed):
                 continue
-            if not measured.issuperset(fitting.follows) or measured.intersection(fitting.unless):
+            if not fitting.of_channels(measured):
                 continue
             if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):
                 found.skipped[name] = f"the model has {' and '.join(fitting.covered_by)}"

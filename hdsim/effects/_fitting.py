@@ -218,6 +218,10 @@ class Fitting:
         """Whether it is asked of a model with teeth, or of one without."""
         return self.mesh in ("", "toothed" if toothed else "toothless")
 
+    def of_channels(self, measured: set[str]) -> bool:
+        """Whether it is asked of records that have measured these channels."""
+        return measured.issuperset(self.follows) and measured.isdisjoint(self.unless)
+
     def count(self, orders: Sequence[float]) -> int:
         """Number of coefficients."""
         return sum(term.count(orders) for term in self.terms)

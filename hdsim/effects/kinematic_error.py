@@ -55,6 +55,14 @@ def _default_components() -> tuple[ErrorComponent, ...]:
     return tuple(ErrorComponent(order=n, amplitude_arcmin=a, per=per) for n, a, per in table)
 
 
+#: Components of a plain fit; a finer one begins with the same, as it takes them over by their places.
+_ORDERS: list[dict[str, Any]] = [
+    {"order": 2, "per": "wave_generator_turn"},
+    {"order": 2, "per": "relative_turn"},
+    {"order": 4, "per": "wave_generator_turn"},
+]
+
+
 class KinematicError(Effect):
     """e = sum A sin(order * angle + phase), added to the mesh twist theta_m/i - theta_f + e.
 
@@ -106,13 +114,7 @@ class KinematicError(Effect):
                 ),
             ),
             turns=1.0,
-            settings={
-                "components": [
-                    {"order": 2, "per": "wave_generator_turn"},
-                    {"order": 2, "per": "relative_turn"},
-                    {"order": 4, "per": "wave_generator_turn"},
-                ]
-            },
+            settings={"components": _ORDERS},
             lives_in=("wave_generator_angle",),
         ),
         Fitting(
@@ -132,9 +134,7 @@ class KinematicError(Effect):
             turns=1.0,
             settings={
                 "components": [
-                    {"order": 2, "per": "wave_generator_turn"},
-                    {"order": 2, "per": "relative_turn"},
-                    {"order": 4, "per": "wave_generator_turn"},
+                    *_ORDERS,
                     {"order": 6, "per": "wave_generator_turn"},
                     {"order": 4, "per": "relative_turn"},
                 ]

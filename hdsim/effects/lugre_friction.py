@@ -155,8 +155,8 @@ class LugreFriction(Effect):
             self.stribeck_velocity_rad_per_s, self._passive_velocity
         )
         numbers = [self.stiffness_nm_per_rad, self.damping_nm_s_per_rad, self.viscous_nm_s_per_rad]
-        numbers += [self.coulomb_nm, self.static_nm, self.stribeck_velocity_rad_per_s, fading]
-        numbers.append(self.stribeck_exponent)
+        numbers += [self.coulomb_nm, self.static_nm, self.stribeck_velocity_rad_per_s]
+        numbers += [fading, self.stribeck_exponent]
         size = self.static_nm / self.stiffness_nm_per_rad
         state = State(
             "bristle_deflection", "rad", 0.0, size, "mean deflection of the LuGre bristles, motor shaft"
