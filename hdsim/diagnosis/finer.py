@@ -121,19 +121,20 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
     for fitting in finer:
         if not fitting.of_mesh(current.state.toothed) or bench.turns < fitting.turns:
             continue
-        if not fitting.of_channels(measured):
+        if not fitting.of_channels(measured, bench.channels):
             continue
         if label == fitting.label or (fitting.refines and label not in fitting.refines):
             continue
         begun = set()
         for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
             pairs = zip(fitting.shapes, one.shapes, strict=True)
-            coefficients = tuple(c for term in one.fitting.terms for c in term.read(settings))
+            orders = plain.orders if one.fitting.periodic else ()
+            coefficients = one.fitting.read(settings, orders)
             # Starts of a shape that the effect has already are one.
             for shapes in product(*(own.get(shape.path, (start,)) for shape, start in pairs)):
                 if shapes not in begun:
                     begun.add(shapes)
-                    yield replace(one, coefficients=coefficients, shapes=shapes)
+                    yield replace(one, coefficients=coefficients, shapes=shapes, orders=orders)
 
 
 def _with_fewer(bench: Bench, found: Fit) -> list[Fit]:

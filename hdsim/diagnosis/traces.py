@@ -114,11 +114,9 @@ def screen(
         if not fittings:
             continue  # it stands for what has no name
         for fitting in fittings:
-            if any(channel not in bench.channels for channel in fitting.needs):
-                continue
             if not fitting.of_mesh(state.toothed):
                 continue
-            if not fitting.of_channels(measured):
+            if not fitting.of_channels(measured, bench.channels):
                 continue
             if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):
                 found.skipped[name] = f"the model has {' and '.join(fitting.covered_by)}"

@@ -8,7 +8,7 @@ diagnosis simulates each term once at its unit size and has the trace that the e
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -214,13 +214,22 @@ class Fitting:
         """Whether it fits the width of a play."""
         return any(term.play for term in self.terms)
 
+    @property
+    def periodic(self) -> bool:
+        """Whether a term has orders that are read from the data."""
+        return any(term.list_path for term in self.terms)
+
     def of_mesh(self, toothed: bool) -> bool:
         """Whether it is asked of a model with teeth, or of one without."""
         return self.mesh in ("", "toothed" if toothed else "toothless")
 
-    def of_channels(self, measured: set[str]) -> bool:
-        """Whether it is asked of records that have measured these channels."""
-        return measured.issuperset(self.follows) and measured.isdisjoint(self.unless)
+    def of_channels(self, measured: set[str], compared: Collection[str]) -> bool:
+        """Whether it is asked of records that have measured these channels, some of them compared."""
+        return (
+            measured.issuperset(self.follows)
+            and measured.isdisjoint(self.unless)
+            and all(channel in compared for channel in self.needs)
+        )
 
     def count(self, orders: Sequence[float]) -> int:
         """Number of coefficients."""
@@ -268,6 +277,16 @@ class Fitting:
         for term, part in self.parts(orders):
             term.write(data, coefficients[part], orders, before)
         return data
+
+    def read(self, settings: Mapping[str, Any], orders: Sequence[float]) -> tuple[float, ...]:
+        """Coefficients of an effect that another of its ways wrote; 0 of what that does not have.
+
+        Args:
+            settings: what it wrote. Items of a list are known by what this way holds fixed of them.
+            orders: orders of periodic terms.
+        """
+        data = _in_places(self.settings, settings)
+        return tuple(c for term, _ in self.parts(orders) for c in term.read(data, orders))
 
     def report(
         self,
@@ -321,3 +340,19 @@ class Fitting:
         for key in section.split("."):
             here = here.get(key, {})
         return list(here)
+
+
+def _in_places(wanted: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings with the items of their lists where others have those alike; the rest of them follows."""
+    data: dict[str, Any] = copied(given)
+    for key, value in wanted.items():
+        if isinstance(value, Mapping):
+            data[key] = _in_places(value, data.get(key, {}))
+        elif isinstance(value, list):
+            rest, data[key] = data.get(key, []), []
+            for item in value:
+                alike = [other for other in rest if other | item == other][:1]
+                data[key] += alike or [{}]
+                rest = [other for other in rest if other not in alike]
+            data[key] += rest
+    return data

@@ -83,6 +83,16 @@ class Periodic(Term):
             items.append(dict(self.settings) | {"order": order})
             self.harmonic(len(items) - 1).write(data, c[2 * k : 2 * k + 2], (), before)
 
+    def read(self, data: Settings, orders: Values) -> list[float]:
+        """Of the items with its orders; they stand anywhere in the list."""
+        items, wanted = copied(at(data, self.section)), dict(self.settings)
+        found: list[float] = []
+        for order in orders:
+            own = wanted | {"order": order}
+            place = next((k for k, item in enumerate(items) if item | own == item), len(items))
+            found += self.harmonic(place).read(data, ())
+        return found
+
     def at_end(self, c: Values, plausible: Limits) -> bool:
         """Any amplitude at its upper end."""
         return any(self.harmonic(0).at_end(c[k : k + 2], plausible) for k in range(0, len(c), 2))

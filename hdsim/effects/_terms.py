@@ -85,9 +85,14 @@ class Term:
         """
         raise NotImplementedError
 
-    def read(self, data: Settings) -> list[float]:
-        """Coefficients at which its fields are as an effect's settings have them; 0 where they have none."""
-        return [0.0] * self.count(())
+    def read(self, data: Settings, orders: Values) -> list[float]:
+        """Coefficients at which its fields are as an effect's settings have them; 0 where they have none.
+
+        Args:
+            data: the settings.
+            orders: orders of periodic terms.
+        """
+        return [0.0] * self.count(orders)
 
     def at_end(self, c: Values, plausible: Limits) -> bool:
         """Whether a field is as strong as its range allows: what is fitted would rather be something else."""
@@ -165,7 +170,7 @@ class Amplitude(Term):
             before[path] = before.get(path, 0.0) + c[0] * unit
             put(data, path, before[path])
 
-    def read(self, data: Settings) -> list[float]:
+    def read(self, data: Settings, orders: Values) -> list[float]:
         """By the first field."""
         path, unit = next(iter(self.units.items()))
         return [_number(data, path) / unit]
@@ -270,7 +275,7 @@ class Harmonic(Term):
         put(data, self.amplitude, self.unit * math.hypot(*c))
         put(data, self.phase, math.degrees(math.atan2(c[1], c[0])))
 
-    def read(self, data: Settings) -> list[float]:
+    def read(self, data: Settings, orders: Values) -> list[float]:
         """From amplitude and phase."""
         size, angle = _number(data, self.amplitude) / self.unit, math.radians(_number(data, self.phase))
         return [size * math.cos(angle), size * math.sin(angle)]

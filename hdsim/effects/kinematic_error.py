@@ -61,6 +61,15 @@ _ORDERS: list[dict[str, Any]] = [
     {"order": 2, "per": "relative_turn"},
     {"order": 4, "per": "wave_generator_turn"},
 ]
+#: Further orders, as the order spectrum has them.
+_FURTHER = Periodic(
+    "components",
+    "amplitude_arcmin",
+    0.1,
+    "output_angle",
+    settings={"per": "wave_generator_turn"},
+    besides=(1.0, 2.0, 2.02, 4.0),
+)
 
 
 class KinematicError(Effect):
@@ -102,17 +111,7 @@ class KinematicError(Effect):
     printed: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
-            (
-                *Harmonic.components("amplitude_arcmin", 0.1, 3),
-                Periodic(
-                    "components",
-                    "amplitude_arcmin",
-                    0.1,
-                    "output_angle",
-                    settings={"per": "wave_generator_turn"},
-                    besides=(1.0, 2.0, 2.02, 4.0),
-                ),
-            ),
+            (*Harmonic.components("amplitude_arcmin", 0.1, 3), _FURTHER),
             turns=1.0,
             settings={"components": _ORDERS},
             lives_in=("wave_generator_angle",),
@@ -126,8 +125,18 @@ class KinematicError(Effect):
         ),
     )
 
-    #: Without an output's encoder no order spectrum shows which orders there are.
+    #: Without an output's encoder no order spectrum shows which orders there are. What goes round once with
+    #: the output may as well be an eccentricity, which has a name of its own.
     finer: ClassVar[tuple[Fitting, ...]] = (
+        Fitting(
+            (*Harmonic.components("amplitude_arcmin", 0.1, 5), _FURTHER),
+            label="of the output too",
+            needs=("output_angle",),
+            turns=20.0,
+            settings={"components": [*_ORDERS, *({"order": n, "per": "output_turn"} for n in (2, 3))]},
+            lives_in=("wave_generator_angle", "output_angle"),
+            refines=("",),
+        ),
         Fitting(
             Harmonic.components("amplitude_arcmin", 0.1, 5),
             label="with multiples of its orders",

@@ -283,6 +283,8 @@ def _drawn(number: int, seed: int, rng: np.random.Generator) -> Try:
     asked: list[float] = []
     truth, near = {}, 1.0
     same = bool(rng.random() < 0.4)
+    if kind == "outside" and hidden[0].accepted:
+        kind, same = "effect", True  # it has a name since, and its law
     if hidden or names:
         seen = Visibility(x)
     for h in hidden:

@@ -305,6 +305,11 @@ def _size(
     return (changes, found) if found.beyond_base >= least else None
 
 
+def _named_since(wanted: Wanted) -> bool:
+    """Whether what was drawn as outside the catalogue has a name there since."""
+    return wanted.kind == "outside" and all(h.accepted for h in wanted.hidden)
+
+
 def _case(wanted: Wanted, sized: Sized, number: int, seed: int) -> Case:
     first = sized.setups[0]
     draws = np.full(6, 0.37)
@@ -316,13 +321,12 @@ def _case(wanted: Wanted, sized: Sized, number: int, seed: int) -> Case:
         for name, many in (("record", sized.setups), ("held out", sized.held))
     ]
     parameter = wanted.kind == "parameter"
+    kind = wanted.kind if not _named_since(wanted) else "effect"
     return Case(
-        key=f"{FAMILY}/{wanted.kind}/{wanted.truth}/{number}/{seed}",
+        key=f"{FAMILY}/{kind}/{wanted.truth}/{number}/{seed}",
         family=FAMILY,
-        kind=wanted.kind,
-        truth=()
-        if wanted.kind == "outside"
-        else tuple(frozenset(h.accepted or (h.name,)) for h in wanted.hidden),
+        kind=kind,
+        truth=() if kind == "outside" else tuple(frozenset(h.accepted or (h.name,)) for h in wanted.hidden),
         records=tuple(records[0]),
         holdout=tuple(records[1]),
         base=base,

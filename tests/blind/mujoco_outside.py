@@ -1,10 +1,13 @@
-"""What is hidden in the MuJoCo plants and is in no catalogue."""
+"""What is hidden in the MuJoCo plants and was in no catalogue when it was first drawn.
+
+What has a name since (``accepted``) is drawn as before and counts as that effect.
+"""
 
 from __future__ import annotations
 
 from mujoco_effects import Hidden
 
-#: Not in the catalogue.
+#: Not in the catalogue, but for what has ``accepted`` names.
 OUTSIDE = (
     Hidden(
         "end stop",
@@ -26,6 +29,8 @@ OUTSIDE = (
     Hidden(
         "churning drag",
         lambda d, r, x, same: {"drag": d.coulomb / d.top_speed**2 * x},
+        accepted=("nonlinear_viscous_friction",),
+        numbers=lambda d, c: {"drag_nm": c["drag"] * 1e4, "speed_exponent": 2.0},
         motions=("multisine", "moves", "plateaus"),
         rigid=True,
         most=15,

@@ -1,4 +1,7 @@
-"""What is hidden in plants and has no name in the catalogue: ``unknown`` is the right answer."""
+"""What is hidden in plants and has no name in the catalogue: ``unknown`` is the right answer.
+
+What has a name since it was first drawn (``accepted``) is drawn as before and counts as that effect.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import math
 import builders
 from hidden import Hidden
 
-#: Not in the catalogue. ``fixed`` places in the range of every motion.
+#: Not in the catalogue, but for what has ``accepted`` names. ``fixed`` places in the range of every motion.
 OUTSIDE = (
     Hidden(
         "spring catch",
@@ -38,6 +41,8 @@ OUTSIDE = (
     Hidden(
         "churning",
         lambda d, r, x, same: {"churn": 0.5 * d.coulomb / d.top_speed**2 * x},
+        accepted=("nonlinear_viscous_friction",),
+        expected=lambda d, c: {"drag_nm": c["churn"] * 1e4, "speed_exponent": 2.0},
         most=6,
         limit="3 times the Coulomb friction at top speed",
     ),

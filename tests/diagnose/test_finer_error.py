@@ -16,6 +16,7 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.opening import bench_for
+from hdsim.estimate.orders import Line
 from hdsim.estimate.records import Record
 from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import state_of
@@ -75,3 +76,61 @@ def test_where_the_output_has_an_encoder_its_spectrum_tells_the_orders(tmp_path:
             one.trusted["output_angle"] = np.ones(len(one.time), dtype=bool)
         bench = bench_for([one], [], scenario(tmp_path), None)
         assert bool(list(_begins(bench, plain, plain.state.added[0]))) is not seen
+
+
+#: What both encoders of a plant show: orders of the wave generator's turn, one that no formula fixes, and
+#: three lobes of the output.
+FURTHER = (*THREE, (6.0, 0.1, 1.1))
+LOBES_ARCMIN, LOBES_RAD = 0.12, 0.9
+
+
+def both_encoders(lobes: int) -> Record:
+    """Both angles of a rigid drive whose kinematic error has an order of the output's turn too."""
+    t, angle, _, _ = motion(20.0)
+    # Most of a turn of the output: its orders are told apart.
+    angle = 6.0 * angle
+    output = angle / RATIO
+    error = sum(size * ARCMIN * np.sin(order * angle + phase) for order, size, phase in FURTHER)
+    error = error + LOBES_ARCMIN * ARCMIN * np.sin(lobes * output + LOBES_RAD)
+    read = output + error + 1e-6 * np.random.default_rng(0).standard_normal(len(t))
+    return Record("bench", t, {"motor_angle": angle, "output_angle": read})
+
+
+def named_by_both(tmp_path: Any, lobes: int) -> tuple[Bench, Fit, Fit]:
+    """The log's bench, the base re-fitted, and that with the plain effect and the spectrum's order."""
+    base = scenario(tmp_path)
+    bench = bench_for([both_encoders(lobes)], [], base, None)
+    found = refit(bench, state_of(base)).fit
+    lines = [Line("output_angle", 6.0, 1.0, 1.0)]
+    plain, *_ = starts("kinematic_error", catalogue()["kinematic_error"].fittings[0], lines, {})
+    assert plain.orders == (6.0,)
+    return bench, found, with_effects(bench, found, plain)
+
+
+def test_lobes_of_the_output_are_found_beside_the_orders_of_the_spectrum(tmp_path: Any) -> None:
+    bench, base, plain = named_by_both(tmp_path, 3)
+    found = together(bench, refined(bench, base, plain, lambda _: None))
+    assert beyond(bench, plain) > 1.0
+    assert beyond(bench, found) < 0.05
+    told = {(c["order"], c["per"]): c for c in found.state.added[0].settings()["components"]}
+    lobes, sixth = told[3, "output_turn"], told[6.0, "wave_generator_turn"]
+    assert lobes["amplitude_arcmin"] == pytest.approx(LOBES_ARCMIN, rel=0.02)
+    assert np.radians(lobes["phase_deg"]) == pytest.approx(LOBES_RAD, abs=0.02)
+    assert sixth["amplitude_arcmin"] == pytest.approx(0.1, rel=0.02)
+
+
+def test_once_a_turn_of_the_output_is_left_to_what_is_eccentric(tmp_path: Any) -> None:
+    bench, base, plain = named_by_both(tmp_path, 1)
+    left = beyond(bench, plain)
+    assert left > 1.0
+    assert beyond(bench, refined(bench, base, plain, lambda _: None)) > 0.5 * left
+
+
+def test_a_finer_formula_begins_with_what_the_plain_one_has_wherever_it_stands(tmp_path: Any) -> None:
+    bench, _, plain = named_by_both(tmp_path, 3)
+    [begun] = _begins(bench, plain, plain.state.added[0])
+    own = {(c["order"], c["per"]): c for c in plain.state.added[0].settings()["components"]}
+    further = {(c["order"], c["per"]): c for c in begun.settings()["components"]}
+    for key, component in own.items():
+        assert further.pop(key)["amplitude_arcmin"] == pytest.approx(component["amplitude_arcmin"])
+    assert [c["amplitude_arcmin"] for c in further.values()] == [0.0, 0.0]

@@ -12,6 +12,7 @@ EFFECTS: dict[str, Any] = {
     "kinematic_error": {},
     "stribeck_friction": {},
     "lugre_friction": {},
+    "nonlinear_viscous_friction": {"speed_exponent": 0.5},
     "torsional_hysteresis_maxwell": {},
     "thermal_friction": {},
     "output_eccentricity": {},

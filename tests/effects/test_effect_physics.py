@@ -20,6 +20,7 @@ from hdsim.effects.load_dependent_loss import LoadDependentLoss
 from hdsim.effects.load_side_friction import LoadSideFriction
 from hdsim.effects.lugre_friction import LugreFriction
 from hdsim.effects.motor_torque_ripple import MotorTorqueRipple, RippleComponent
+from hdsim.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from hdsim.effects.output_backlash import OutputBacklash
 from hdsim.effects.output_eccentricity import OutputEccentricity
 from hdsim.effects.stiffness_nonlinearity import StiffnessNonlinearity
@@ -136,6 +137,37 @@ def test_the_stribeck_bump_of_any_exponent_is_the_general_exponential(exponent: 
     assert at(model, MOTOR_VELOCITY=0.0)[k.INPUT_FRICTION] == 0.0
 
 
+@pytest.mark.parametrize("exponent", [0.3, 1.0, 2.0, 3.0])
+def test_nonlinear_viscous_friction_is_a_power_of_the_speed(exponent: float) -> None:
+    effect = NonlinearViscousFriction(
+        drag_nm=0.02, speed_exponent=exponent, reference_speed_rad_per_s=50, smoothing_velocity_rad_per_s=1e-4
+    )
+    model = Alone(effect)
+    for speed in (0.5, -3.0, 50.0, 400.0):
+        outputs = at(model, MOTOR_VELOCITY=speed)
+        expected = math.copysign(0.02 * (abs(speed) / 50) ** exponent, speed)
+        assert outputs[k.INPUT_FRICTION] == pytest.approx(expected, rel=1e-6)
+        assert outputs[k.MOTOR_TORQUE] == pytest.approx(-expected, rel=1e-6)
+        assert outputs[k.DISSIPATED] == pytest.approx(expected * speed, rel=1e-6)
+    assert at(model, MOTOR_VELOCITY=0.0)[k.INPUT_FRICTION] == 0.0
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_a_disk_coasts_down_under_a_power_of_its_speed_as_its_integral_says(exponent: float) -> None:
+    # J w' = -D (w/w_r)^n: w = w_0 exp(-D t/(J w_r)), and w_0/(1 + w_0 D t/(J w_r^2)) at n = 2.
+    inertia, drag, reference, first, time = 1e-4, 0.02, 50.0, 200.0, 0.3
+    model = Alone(
+        NonlinearViscousFriction(drag_nm=drag, speed_exponent=exponent, reference_speed_rad_per_s=reference)
+    )
+    found = solve_ivp(
+        lambda t, w: [at(model, MOTOR_VELOCITY=w[0])[k.MOTOR_TORQUE] / inertia], (0, time), [first],
+        rtol=1e-9, atol=1e-9,
+    )  # fmt: skip
+    rate = drag * time / (inertia * reference)
+    expected = first * math.exp(-rate) if exponent == 1.0 else first / (1 + first * rate / reference)
+    assert found.y[0, -1] == pytest.approx(expected, rel=1e-4)
+
+
 @pytest.mark.parametrize("exponent", [0.5, 1.3, 3.0])
 @pytest.mark.parametrize("speed", [-0.02, 0.3, 7.0])
 def test_slopes_of_friction_with_an_exponent_are_those_of_differences(exponent: float, speed: float) -> None:
@@ -143,6 +175,7 @@ def test_slopes_of_friction_with_an_exponent_are_those_of_differences(exponent: 
         StribeckFriction(stribeck_exponent=exponent),
         LugreFriction(stribeck_exponent=exponent),
         LoadDependentLoss(load_exponent=min(exponent, 2.0)),
+        NonlinearViscousFriction(speed_exponent=exponent),
     ]
     for effect in kinds:
         model = Alone(effect)
@@ -159,7 +192,9 @@ def test_slopes_of_friction_with_an_exponent_are_those_of_differences(exponent: 
 
 
 def test_friction_with_an_exponent_has_a_slope_at_rest() -> None:
-    for effect in (StribeckFriction(stribeck_exponent=0.5), LugreFriction(stribeck_exponent=0.5)):
+    kinds = (StribeckFriction, LugreFriction)
+    powers = [kind(stribeck_exponent=0.5) for kind in kinds]
+    for effect in (*powers, NonlinearViscousFriction(speed_exponent=0.5)):
         model = Alone(effect)
         assert np.all(np.isfinite(model(model.initial)[1]))
 

@@ -81,6 +81,8 @@ UNITS = {
     "static_nm": "N m",
     "stiffness_coefficient_per_k": "1/K",
     "stiffness_nm_per_rad": "N m/rad",
+    "drag_nm": "N m",
+    "speed_exponent": "",
     "stribeck_exponent": "",
     "stribeck_velocity_rad_per_s": "rad/s",
     "tooth": "",

@@ -39,6 +39,8 @@ EXPECTED = {
     "motor_torque_ripple.components.cogging_nm": "N m",
     "motor_torque_ripple.components.order": "",
     "motor_torque_ripple.components.phase_deg": "deg",
+    "nonlinear_viscous_friction.drag_nm": "N m",
+    "nonlinear_viscous_friction.speed_exponent": "",
     "output_backlash.backlash_arcmin": "arcmin",
     "output_backlash.components.amplitude_arcmin": "arcmin",
     "output_backlash.components.phase_deg": "deg",

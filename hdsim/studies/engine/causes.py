@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 _KINEMATIC = ("kinematic_error", "wave_generator_eccentricity", "output_eccentricity", "damaged_tooth")
 _HYSTERESIS = ("torsional_hysteresis_maxwell", "torsional_hysteresis_duhem")
 _FRICTION = (
-    "input_coulomb_viscous", "stribeck_friction", "lugre_friction", "load_dependent_loss",
-    "load_side_friction", "thermal_friction", "motor_torque_ripple", "resonant_torque_ripple",
+    "input_coulomb_viscous", "nonlinear_viscous_friction", "stribeck_friction", "lugre_friction",
+    "load_dependent_loss", "load_side_friction", "thermal_friction", "motor_torque_ripple",
+    "resonant_torque_ripple",
 )  # fmt: skip
 #: Damping, as a share of the critical, of the load on the drive once no controller damps it.
 _DAMPING = 0.2
