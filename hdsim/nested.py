@@ -53,3 +53,19 @@ def copied(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [copied(item) for item in value]
     return value
+
+
+def in_places(wanted: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings with the items of their lists where others have those alike; the rest of them follows."""
+    data: dict[str, Any] = copied(given)
+    for key, value in wanted.items():
+        if isinstance(value, Mapping):
+            data[key] = in_places(value, data.get(key, {}))
+        elif isinstance(value, list):
+            rest, data[key] = data.get(key, []), []
+            for item in value:
+                alike = [other for other in rest if other | item == other][:1]
+                data[key] += alike or [{}]
+                rest = [other for other in rest if other not in alike]
+            data[key] += rest
+    return data

@@ -128,7 +128,7 @@ def _begins(bench: Bench, current: Fit, plain: Added) -> Iterator[Added]:
         begun = set()
         for one in starts(plain.effect, fitting, (), bench.ranges(current.state)):
             pairs = zip(fitting.shapes, one.shapes, strict=True)
-            orders = plain.orders if one.fitting.periodic else ()
+            orders = one.fitting.orders_of(plain.orders)
             coefficients = one.fitting.read(settings, orders)
             # Starts of a shape that the effect has already are one.
             for shapes in product(*(own.get(shape.path, (start,)) for shape, start in pairs)):

@@ -121,6 +121,9 @@ def screen(
             if fitting.covered_by and all((number_at(state, path) or 0.0) > 0 for path in fitting.covered_by):
                 found.skipped[name] = f"the model has {' and '.join(fitting.covered_by)}"
                 continue
+            if lacking := [path for path in fitting.beyond if not _has(state, path)]:
+                found.skipped[name] = f"the model has no {' and '.join(lacking)} to depart from"
+                continue
             if bench.turns < fitting.turns:
                 found.skipped[name] = f"the wave generator makes {bench.turns:.2g} turns only"
                 continue
@@ -245,3 +248,11 @@ def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:
         if not any(use):
             powers = residual.powers
             return Share(0.0, powers, np.zeros(columns.shape[1]), share.chance)
+
+
+def _has(state: State, path: str) -> bool:
+    """Whether a model has a number above zero, or an effect has a field of that name that is."""
+    _, _, name = path.rpartition(".")
+    own = [number_at(state, path), *(getattr(effect, name, 0.0) for effect in state.effects.values())]
+    own += [added.settings().get(name, 0.0) for added in state.added]
+    return any((value or 0.0) > 0 for value in own)

@@ -24,7 +24,7 @@ from hdsim.effects._terms import (
     Ranged,
     Term,
 )
-from hdsim.nested import copied, put
+from hdsim.nested import copied, in_places, put
 
 if TYPE_CHECKING:
     import numpy as np
@@ -177,6 +177,8 @@ class Fitting:
         needs: channels without which it cannot be told.
         turns: least travel of the wave generator, in turns, without which its trace looks like anything.
         covered_by: numbers of a scenario that say the same: where all are above zero the re-fit has had it.
+        beyond: numbers of a scenario that it is a departure from: not asked while one of them is none and no
+            effect has a field of that name.
         cumulative: a term has a meaning only on top of those before it, and adds to their fields.
         follows: measured channels that it takes as they are (``Builder.external``): asked only of records
             that have them.
@@ -196,6 +198,7 @@ class Fitting:
     needs: tuple[str, ...] = ()
     turns: float = 0.0
     covered_by: tuple[str, ...] = ()
+    beyond: tuple[str, ...] = ()
     cumulative: bool = False
     follows: tuple[str, ...] = ()
     unless: tuple[str, ...] = ()
@@ -213,11 +216,6 @@ class Fitting:
     def play(self) -> bool:
         """Whether it fits the width of a play."""
         return any(term.play for term in self.terms)
-
-    @property
-    def periodic(self) -> bool:
-        """Whether a term has orders that are read from the data."""
-        return any(term.list_path for term in self.terms)
 
     def of_mesh(self, toothed: bool) -> bool:
         """Whether it is asked of a model with teeth, or of one without."""
@@ -278,6 +276,11 @@ class Fitting:
             term.write(data, coefficients[part], orders, before)
         return data
 
+    def orders_of(self, orders: Sequence[float]) -> tuple[float, ...]:
+        """Of the orders that another way has read from the data those that a term of this one has as well."""
+        found = (term.orders_shared(orders) for term in self.terms)
+        return next((shared for shared in found if shared), ())
+
     def read(self, settings: Mapping[str, Any], orders: Sequence[float]) -> tuple[float, ...]:
         """Coefficients of an effect that another of its ways wrote; 0 of what that does not have.
 
@@ -285,7 +288,7 @@ class Fitting:
             settings: what it wrote. Items of a list are known by what this way holds fixed of them.
             orders: orders of periodic terms.
         """
-        data = _in_places(self.settings, settings)
+        data = in_places(self.settings, settings)
         return tuple(c for term, _ in self.parts(orders) for c in term.read(data, orders))
 
     def report(
@@ -340,19 +343,3 @@ class Fitting:
         for key in section.split("."):
             here = here.get(key, {})
         return list(here)
-
-
-def _in_places(wanted: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with the items of their lists where others have those alike; the rest of them follows."""
-    data: dict[str, Any] = copied(given)
-    for key, value in wanted.items():
-        if isinstance(value, Mapping):
-            data[key] = _in_places(value, data.get(key, {}))
-        elif isinstance(value, list):
-            rest, data[key] = data.get(key, []), []
-            for item in value:
-                alike = [other for other in rest if other | item == other][:1]
-                data[key] += alike or [{}]
-                rest = [other for other in rest if other not in alike]
-            data[key] += rest
-    return data

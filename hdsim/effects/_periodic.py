@@ -63,9 +63,14 @@ class Periodic(Term):
         Beyond the strongest only whole ones: what wobbles or rings has any number of others.
         """
         own = [order for channel, order in lines if channel == self.channel and order >= 1.0]
-        own = [order for order in own if not any(abs(order - other) < 0.05 for other in self.besides)]
+        own = list(self.orders_shared(own))
         own = [*own[:most], *(order for order in own[most:] if order == round(order))]
         return tuple(own) if own or self.besides else None
+
+    def orders_shared(self, orders: Values) -> tuple[float, ...]:
+        """Those that no other term has."""
+        near = 0.05
+        return tuple(o for o in orders if all(abs(o - other) >= near for other in self.besides))
 
     def harmonic(self, item: int) -> Harmonic:
         """The harmonic that an item of the list is."""

@@ -111,6 +111,10 @@ class Term:
         """
         return ()
 
+    def orders_shared(self, orders: Values) -> tuple[float, ...]:
+        """Of the orders that another fitting has read from the data those that this term reads, too."""
+        return ()
+
     def sized(self, ranges: Mapping[str, float]) -> Self:
         """The term in units of its own, where they are parts of a range that the record covers."""
         return self

@@ -61,15 +61,25 @@ _ORDERS: list[dict[str, Any]] = [
     {"order": 2, "per": "relative_turn"},
     {"order": 4, "per": "wave_generator_turn"},
 ]
-#: Further orders, as the order spectrum has them.
-_FURTHER = Periodic(
-    "components",
-    "amplitude_arcmin",
-    0.1,
-    "output_angle",
-    settings={"per": "wave_generator_turn"},
-    besides=(1.0, 2.0, 2.02, 4.0),
-)
+#: Their multiples, and lobes of the output. What goes round once with the output may as well be an
+#: eccentricity, which has a name of its own.
+_MULTIPLES: list[dict[str, Any]] = [
+    {"order": 6, "per": "wave_generator_turn"},
+    {"order": 4, "per": "relative_turn"},
+]
+_LOBES: list[dict[str, Any]] = [{"order": n, "per": "output_turn"} for n in (2, 3)]
+
+
+def _further(*besides: float) -> Periodic:
+    """Other orders, as the order spectrum has them."""
+    return Periodic(
+        "components",
+        "amplitude_arcmin",
+        0.1,
+        "output_angle",
+        settings={"per": "wave_generator_turn"},
+        besides=(1.0, 2.0, 2.02, 4.0, *besides),
+    )
 
 
 class KinematicError(Effect):
@@ -111,7 +121,7 @@ class KinematicError(Effect):
     printed: ClassVar[bool] = True
     fittings: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
-            (*Harmonic.components("amplitude_arcmin", 0.1, 3), _FURTHER),
+            (*Harmonic.components("amplitude_arcmin", 0.1, 3), _further()),
             turns=1.0,
             settings={"components": _ORDERS},
             lives_in=("wave_generator_angle",),
@@ -125,32 +135,25 @@ class KinematicError(Effect):
         ),
     )
 
-    #: Without an output's encoder no order spectrum shows which orders there are. What goes round once with
-    #: the output may as well be an eccentricity, which has a name of its own.
+    #: Without an output's encoder no order spectrum shows which orders there are, and where a record passes
+    #: a resonance the spectrum misses some.
     finer: ClassVar[tuple[Fitting, ...]] = (
         Fitting(
-            (*Harmonic.components("amplitude_arcmin", 0.1, 5), _FURTHER),
-            label="of the output too",
-            needs=("output_angle",),
-            turns=20.0,
-            settings={"components": [*_ORDERS, *({"order": n, "per": "output_turn"} for n in (2, 3))]},
-            lives_in=("wave_generator_angle", "output_angle"),
+            (*Harmonic.components("amplitude_arcmin", 0.1, 5), _further(4.04, 6.0)),
+            label="with multiples of its orders",
+            turns=1.0,
+            settings={"components": [*_ORDERS, *_MULTIPLES]},
+            lives_in=("wave_generator_angle",),
             refines=("",),
         ),
         Fitting(
-            Harmonic.components("amplitude_arcmin", 0.1, 5),
-            label="with multiples of its orders",
-            turns=1.0,
-            settings={
-                "components": [
-                    *_ORDERS,
-                    {"order": 6, "per": "wave_generator_turn"},
-                    {"order": 4, "per": "relative_turn"},
-                ]
-            },
-            unless=("output_angle",),
-            lives_in=("wave_generator_angle",),
-            refines=("",),
+            (*Harmonic.components("amplitude_arcmin", 0.1, 7), _further(4.04, 6.0)),
+            label="with multiples, and of the output",
+            needs=("output_angle",),
+            turns=20.0,
+            settings={"components": [*_ORDERS, *_MULTIPLES, *_LOBES]},
+            lives_in=("wave_generator_angle", "output_angle"),
+            refines=("", "with multiples of its orders"),
         ),
     )
 

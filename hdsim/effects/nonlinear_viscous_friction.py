@@ -59,6 +59,7 @@ class NonlinearViscousFriction(Effect):
         Fitting(
             (Amplitude({"drag_nm": 0.01}),),
             (Shape("speed_exponent", (0.5, 2.0), least=0.25, most=3.0),),
+            beyond=("drive.friction.viscous_nm_s_per_rad",),
         ),
     )
 

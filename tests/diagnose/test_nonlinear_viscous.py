@@ -46,3 +46,14 @@ def test_friction_in_proportion_to_speed_is_a_number_of_the_drive(tmp_path: Any)
     found = diagnose([rigid_record(20.0, noise=5e-4, extra=power(1.0))], scenario(tmp_path)).verdict
     assert found.verdict == "parameter"
     assert "drive.friction.viscous_nm_s_per_rad" in found.moved
+
+
+@pytest.mark.parametrize("churns", [False, True])
+def test_it_is_a_departure_from_friction_that_is_there(tmp_path: Any, churns: bool) -> None:
+    base = scenario(tmp_path, friction={"viscous_nm_s_per_rad": 0.0})
+    record = rigid_record(20.0, noise=5e-4, **({"extra": power(2.0)} if churns else {}))
+    found = diagnose([record], base).verdict
+    first, *further = found.effects
+    assert "input_coulomb_viscous" in (first.name, *first.indistinguishable_from)
+    assert "nonlinear_viscous_friction" not in (first.name, *first.indistinguishable_from)
+    assert [effect.name for effect in further] == (["nonlinear_viscous_friction"] if churns else [])
