@@ -85,7 +85,13 @@ class Recording:
 
     @property
     def state(self) -> Table:
-        """The table at full rate."""
+        """The table at full rate.
+
+        Raises:
+            InputError: there is none, as the run stopped before its first sample.
+        """
+        if "state" not in self.tables:
+            raise InputError("no sample is there: the run stopped before its first one")
         return self.tables["state"]
 
     @property

@@ -75,7 +75,7 @@ def run(
             session.close()
     tell(done, loaded.run.duration_s)
     recording = hdsim.open_log(path)
-    if len(recording.time) > 1:
+    if "state" in recording.tables and len(recording.time) > 1:
         tell_numbers(recording, loaded)
     click.echo(f"log      {path}")
     if verify:
@@ -100,8 +100,9 @@ def run(
 def tell(run: Run, duration_s: float) -> None:
     """Print what a run came to."""
     audit, work = run.audit, run.statistics
+    reached = f"{duration_s:g} s" if run.reached_s is None else f"{run.reached_s:g} of {duration_s:g} s"
     click.echo(
-        f"simulated {duration_s:g} s in {work.steps} steps ({work.nfev} right-hand sides); energy audit: "
+        f"simulated {reached} in {work.steps} steps ({work.nfev} right-hand sides); energy audit: "
         f"residual {audit.residual:.2e} J of {audit.exchanged:.3g} J exchanged ({audit.relative:.1e})"
     )
     if audit.gave_back:

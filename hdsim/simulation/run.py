@@ -78,6 +78,7 @@ class Run:
         statistics: the solver's work so far.
         events: what happened so far.
         failure: why the run stopped early, or None.
+        reached_s: how far it came, where it stopped early.
     """
 
     def __init__(
@@ -112,6 +113,7 @@ class Run:
         #: Samples of the state table that leave together, and the longest span in samples.
         self.block = BLOCK
         self.failure: str | None = None
+        self.reached_s: float | None = None
         self.interrupted: BaseException | None = None
         # True channels as far back as the sensors look: for the controller, and for the log.
         self._recent: Table | None = None
@@ -266,7 +268,7 @@ class Run:
     def _fail(self, found: Any) -> None:
         """Record why the integration stopped."""
         self.interrupted = found.exception if isinstance(found.exception, KeyboardInterrupt) else None
-        self.failure = told(self.model, found)
+        self.failure, self.reached_s = told(self.model, found), float(found.t_end)
         self.events.append(Event(found.t_end, "error", "solver", self.failure))
 
     def static(self) -> dict[str, Column]:

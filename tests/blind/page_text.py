@@ -45,7 +45,8 @@ for the column that says otherwise.
 **What is drawn** (`numpy`; the other families as far as their plants allow). Of twenty cases {_share("null")}
 hide nothing, in {_share("parameter")} one or two parameters of the base are wrong by 5 to 30 %,
 {_share("effect")} hide one effect (half by the catalogue's own equation, half by another), {_share("pair")}
-a pair of different kinds, {_share("outside")} an effect outside the catalogue. Strength log-uniform from
+a pair of different kinds, {_share("outside")} what the catalogue did not hold when the cases were first drawn
+(churning has a name there since, and counts as an effect alone). Strength log-uniform from
 {STRENGTH[0]:g} to {STRENGTH[1]:g} (pairs {PAIR_STRENGTH[0]:g} to {PAIR_STRENGTH[1]:g}), sample rate from
 {RATE_HZ[0]:g} to {RATE_HZ[1]:g} Hz, encoder steps from {STEP[0]:g} to {STEP[1]:g} times the noise, records
 of {SECONDS[0]:g} to {SECONDS[1]:g} s and some to 60 s, one to four of them. Motor side alone, both

@@ -90,6 +90,24 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path: Path, capsys: pytest.
     assert any(event.level == "error" for event in recording.events)
 
 
+def test_a_run_that_fails_before_its_first_sample_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario = tmp_path / "free.yaml"
+    text = SHORT.format(motor="free", duration=0.05, rate=1000)
+    # Legal, and its torque is beyond any number.
+    text += "effects: {nonlinear_viscous_friction: {reference_speed_rad_per_s: 1.0e-300}}\n"
+    scenario.write_text(text)
+    assert run(scenario, "-o", tmp_path / "u.mcap") == 1
+    printed = capsys.readouterr()
+    assert "stopped early" in printed.err
+    assert "t = 0 s" in printed.err
+    assert "Traceback" not in printed.err
+    assert "simulated 0 of 0.05 s" in printed.out
+    with pytest.raises(hdsim.InputError, match="before its first"):
+        print(hdsim.open_log(tmp_path / "u.mcap").time)
+
+
 @pytest.mark.slow
 def test_kill_in_mid_run_leaves_a_log_that_can_be_recovered(tmp_path: Path) -> None:
     scenario = tmp_path / "long.yaml"
