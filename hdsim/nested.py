@@ -64,8 +64,7 @@ def in_places(wanted: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, 
         elif isinstance(value, list):
             rest, data[key] = data.get(key, []), []
             for item in value:
-                alike = [other for other in rest if other | item == other][:1]
-                data[key] += alike or [{}]
-                rest = [other for other in rest if other not in alike]
+                place = next((k for k, other in enumerate(rest) if other | item == other), None)
+                data[key].append({} if place is None else rest.pop(place))
             data[key] += rest
     return data

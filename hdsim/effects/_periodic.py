@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+#: Distance below which two orders are one.
+NEAR = 0.05
+
 
 @dataclass(frozen=True)
 class Periodic(Term):
@@ -69,8 +72,7 @@ class Periodic(Term):
 
     def orders_shared(self, orders: Values) -> tuple[float, ...]:
         """Those that no other term has."""
-        near = 0.05
-        return tuple(o for o in orders if all(abs(o - other) >= near for other in self.besides))
+        return tuple(o for o in orders if all(abs(o - other) >= NEAR for other in self.besides))
 
     def harmonic(self, item: int) -> Harmonic:
         """The harmonic that an item of the list is."""

@@ -76,7 +76,7 @@ LOBES_ARCMIN, LOBES_RAD = 0.12, 0.9
 def both_encoders(lobes: int) -> Record:
     """Both angles of a rigid drive whose kinematic error has an order of the output's turn too."""
     t, angle, _, _ = motion(20.0)
-    # Most of a turn of the output: its orders are told apart.
+    # More than a turn of the output: its orders are told apart.
     angle = 6.0 * angle
     output = angle / RATIO
     error = sum(size * ARCMIN * np.sin(order * angle + phase) for order, size, phase in FURTHER)
