@@ -68,7 +68,7 @@ def test_multiples_of_an_order_are_found_with_their_sizes_and_phases(tmp_path: A
     ids=lambda way: way.label or "of the wave generator",
 )
 def test_a_finer_formula_begins_as_the_plain_one_of_the_same_turn_is(plain: Fitting) -> None:
-    bench = SimpleNamespace(turns=100.0, measured=set(), ranges=lambda state: {})
+    bench = SimpleNamespace(turns=100.0, measured=set(), channels=(), ranges=lambda state: {})
     current = SimpleNamespace(state=SimpleNamespace(toothed=False))
     added, *_ = starts("position_dependent_friction", plain, (), {})
     added = replace(added, coefficients=tuple(0.5 * k - 1.1 for k in range(len(added.coefficients))))

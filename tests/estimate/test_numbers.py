@@ -316,9 +316,21 @@ def test_whatever_a_fits_bounds_allow_is_a_legal_effect(name):
 def test_a_term_reads_back_what_it_has_written() -> None:
     term, data = Amplitude({"a_nm": 0.5, "inner.b": 2.0}), {"inner": {}}
     term.write(data, [3.0], (), {})
-    assert term.read(data) == [3.0]
-    assert term.read({"inner": {"b": 6.0}}) == [0.0]
+    assert term.read(data, ()) == [3.0]
+    assert term.read({"inner": {"b": 6.0}}, ()) == [0.0]
     wave, turned = Harmonic("waves.0.a_nm", "waves.0.phase_deg", 0.5), {"waves": [{}]}
     wave.write(turned, [3.0, -4.0], (), {})
-    assert wave.read(turned) == pytest.approx([3.0, -4.0])
-    assert wave.read({"waves": []}) == [0.0, 0.0]
+    assert wave.read(turned, ()) == pytest.approx([3.0, -4.0])
+    assert wave.read({"waves": []}, ()) == [0.0, 0.0]
+    orders = Periodic("waves", "a_nm", 0.5, "motor_torque", settings={"per": "output_turn"})
+    orders.write(turned, [1.0, 2.0, -3.0, 0.5], (6.0, 7.0), {})
+    assert orders.read(turned, (7.0, 6.0, 8.0)) == pytest.approx([-3.0, 0.5, 1.0, 2.0, 0.0, 0.0])
+
+
+def test_a_way_of_fitting_reads_what_another_wrote_wherever_it_stands() -> None:
+    def way(*orders: int) -> Fitting:
+        settings = {"components": [{"order": order} for order in orders]}
+        return Fitting(Harmonic.components("a_nm", 0.5, len(orders)), settings=settings)
+
+    written = way(4, 2, 2).written([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], (), ())
+    assert way(2, 3, 4, 2).read(written, ()) == pytest.approx([3.0, 4.0, 0.0, 0.0, 1.0, 2.0, 5.0, 6.0])
