@@ -253,6 +253,5 @@ def _allowed(residual: Residual, columns: Array, free: list[bool]) -> Share:
 def _has(state: State, path: str) -> bool:
     """Whether a model has a number above zero, or an effect has a field of that name that is."""
     _, _, name = path.rpartition(".")
-    own = [number_at(state, path), *(getattr(effect, name, 0.0) for effect in state.effects.values())]
-    own += [added.settings().get(name, 0.0) for added in state.added]
-    return any((value or 0.0) > 0 for value in own)
+    of_effects = (getattr(effect, name, 0.0) for effect in state.merged_effects().values())
+    return any((value or 0.0) > 0 for value in (number_at(state, path), *of_effects))

@@ -92,10 +92,9 @@ class Periodic(Term):
 
     def read(self, data: Settings, orders: Values) -> list[float]:
         """Of the items with its orders; they stand anywhere in the list."""
-        items, wanted = copied(at(data, self.section)), dict(self.settings)
-        found: list[float] = []
+        items, found = at(data, self.section), list[float]()
         for order in orders:
-            own = wanted | {"order": order}
+            own = dict(self.settings) | {"order": order}
             place = next((k for k, item in enumerate(items) if item | own == item), len(items))
             found += self.harmonic(place).read(data, ())
         return found

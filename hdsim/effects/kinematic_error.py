@@ -55,7 +55,7 @@ def _default_components() -> tuple[ErrorComponent, ...]:
     return tuple(ErrorComponent(order=n, amplitude_arcmin=a, per=per) for n, a, per in table)
 
 
-#: Components of a plain fit; a finer one begins with the same, as it takes them over by their places.
+#: Components of a plain fit; a finer one has the same, and takes over what was found of them.
 _ORDERS: list[dict[str, Any]] = [
     {"order": 2, "per": "wave_generator_turn"},
     {"order": 2, "per": "relative_turn"},

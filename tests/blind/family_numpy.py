@@ -305,11 +305,6 @@ def _size(
     return (changes, found) if found.beyond_base >= least else None
 
 
-def _named_since(wanted: Wanted) -> bool:
-    """Whether what was drawn as outside the catalogue has a name there since."""
-    return wanted.kind == "outside" and all(h.accepted for h in wanted.hidden)
-
-
 def _case(wanted: Wanted, sized: Sized, number: int, seed: int) -> Case:
     first = sized.setups[0]
     draws = np.full(6, 0.37)
@@ -321,7 +316,9 @@ def _case(wanted: Wanted, sized: Sized, number: int, seed: int) -> Case:
         for name, many in (("record", sized.setups), ("held out", sized.held))
     ]
     parameter = wanted.kind == "parameter"
-    kind = wanted.kind if not _named_since(wanted) else "effect"
+    kind = wanted.kind
+    if kind == "outside" and wanted.hidden[0].accepted:
+        kind = "effect"  # it has a name since
     return Case(
         key=f"{FAMILY}/{kind}/{wanted.truth}/{number}/{seed}",
         family=FAMILY,

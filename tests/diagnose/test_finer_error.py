@@ -67,6 +67,19 @@ def test_an_error_of_the_plain_orders_stays_one(tmp_path: Any) -> None:
     assert refined(bench, base, plain, lambda _: None) is plain
 
 
+def test_lobes_of_the_output_are_asked_of_records_that_have_its_encoder(tmp_path: Any) -> None:
+    _, _, plain = named(tmp_path, THREE)
+    for seen in (False, True):
+        one = record(THREE)
+        if seen:
+            one.channels["output_angle"] = one.channels["motor_angle"] / RATIO
+            one.trusted["output_angle"] = np.ones(len(one.time), dtype=bool)
+        bench = bench_for([one], [], scenario(tmp_path), None)
+        begun = [each.settings()["components"] for each in _begins(bench, plain, plain.state.added[0])]
+        assert begun
+        assert any(c["per"] == "output_turn" for components in begun for c in components) is seen
+
+
 #: What both encoders of a plant show: orders of the wave generator's turn, one that no formula fixes, and
 #: three lobes of the output.
 FURTHER = (*THREE, (6.0, 0.1, 1.1))
