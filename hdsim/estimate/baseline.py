@@ -109,6 +109,7 @@ def boosted(bench: Bench, state: State, begun: Sequence[Array]) -> list[Array]:
         InputError: scikit-learn is not there.
     """
     maker, rest = trees(), bench.residuals(begun, drift=True)
+    heat = all("temperature" in predictor.record.readable for predictor in bench.predictors)
     found = list(begun)
     for channel in bench.channels:
         own = [k for k, s in enumerate(bench.series) if s.channel == channel]
@@ -116,7 +117,7 @@ def boosted(bench: Bench, state: State, begun: Sequence[Array]) -> list[Array]:
         if not seen:
             continue
         features = {
-            k: _features(bench.predictors[bench.series[k].record], bench.series[k], state) for k in own
+            k: _features(bench.predictors[bench.series[k].record], bench.series[k], state, heat) for k in own
         }
         rows = [bench.series[k].train for k in seen]
         part = [_folds(len(r)) for r in rows]
@@ -148,10 +149,9 @@ def trees() -> Any:
 
 
 def _columns(predictor: Predictor, series: Series, state: State) -> Array:
-    """Terms of a series' regression without its orders, shape (n, p); none for a sensor that is the load."""
-    if _is_load(predictor, series):
-        return np.zeros((len(series.measured), 0))
-    return np.column_stack([beside_inertia(predictor, state), predictor.motor_acceleration])
+    """Terms of a series' regression without its orders, shape (n, p); zeros for a sensor that is the load."""
+    terms = np.column_stack([beside_inertia(predictor, state), predictor.motor_acceleration])
+    return np.zeros_like(terms) if _is_load(predictor, series) else terms
 
 
 def beside_inertia(predictor: Predictor, state: State) -> Array:
@@ -159,15 +159,17 @@ def beside_inertia(predictor: Predictor, state: State) -> Array:
     angle, speed = predictor.motor_angle / predictor.ratio, predictor.motor_velocity
     place = [angle, angle**3] if predictor.plan.locked else [np.sin(angle), np.cos(angle)]
     if predictor.plan.load == "output_torque":
-        place = []  # the sensor reads gravity too
+        place = [np.zeros_like(angle)] * 2  # the sensor reads gravity too
     return np.column_stack([*place, np.tanh(speed / RESOLVED_RAD_PER_S), speed, *_load(predictor, state)])
 
 
-def _features(predictor: Predictor, series: Series, state: State) -> Array:
-    """What the black box sees of a series, shape (n, p)."""
+def _features(predictor: Predictor, series: Series, state: State, heat: bool) -> Array:
+    """What the black box sees of a series, its temperature too where there is ``heat``, shape (n, p)."""
     time, angle, speed = predictor.record.time, predictor.motor_angle, predictor.motor_velocity
-    known = [] if _is_load(predictor, series) else _load(predictor, state)
-    if "temperature" in predictor.record.readable:
+    known = _load(predictor, state)
+    if _is_load(predictor, series):
+        known = [np.zeros_like(time)] * len(known)
+    if heat:
         known.append(predictor.record.filled("temperature"))
     follow = [speed, predictor.motor_acceleration, *known]
     late = [np.interp(time - lag, time, values) for lag in LAGS_S for values in follow]
@@ -180,16 +182,20 @@ def _is_load(predictor: Predictor, series: Series) -> bool:
 
 
 def _load(predictor: Predictor, state: State) -> list[Array]:
-    """The known torques on the output, shape (n,) each."""
-    found = []
+    """Torques of an arm and of a load on the output, known or none, shape (n,) each.
+
+    Records of one campaign have the same terms, whatever is known of the load of each.
+    """
+    time = predictor.record.time
+    arm, known = np.zeros_like(time), np.zeros_like(time)
     if predictor.course is not None:
         motion = np.array([predictor.motor_angle, predictor.motor_velocity, predictor.motor_acceleration])
-        found = [predictor.course.torque(state.load.arm, predictor.record.time, motion / predictor.ratio)]
+        arm = predictor.course.torque(state.load.arm, time, motion / predictor.ratio)
     if predictor.load_torque is not None:
-        found.append(predictor.load_torque.values(predictor.record.time + LEAD_IN_S)[0])
+        known = predictor.load_torque.values(time + LEAD_IN_S)[0]
     elif state.load.torque is not None:
-        found.append(state.load.torque.values(predictor.record.time + predictor.record.begins_s)[0])
-    return found
+        known = state.load.torque.values(time + predictor.record.begins_s)[0]
+    return [arm, known]
 
 
 def _given(bench: Bench, series: Series) -> Array:

@@ -56,17 +56,18 @@ def own_clock(record: Record) -> Clock | None:
         return None
     time, fresh = record.time, np.flatnonzero(~repeated)
     period = record.period_s
-    steps = np.diff(record.filled(angle)[fresh], prepend=np.nan)
-    steps[0] = steps[1]
-    way = _usual(steps)
-    # Twice the way in one step: a reading was lost there.
-    clear = np.abs(way) > STEPS * quantisation_step(record.channels[angle][record.trusted[angle]])
-    lost = find_spikes(steps, np.ones(len(steps), dtype=bool)) & clear
-    lost &= np.abs(steps - 2.0 * way) < 0.5 * np.abs(way)
     ticks = np.maximum(np.round(np.diff(time[fresh], prepend=time[0] - period) / period), 1.0)
     # Past repeated rows the stamps have gone on, and the sensor has not.
-    ticks -= np.diff(fresh, prepend=fresh[0] - 1) - 1
-    number = np.cumsum(np.maximum(ticks, 1.0) + lost)
+    ticks = np.maximum(ticks - (np.diff(fresh, prepend=fresh[0] - 1) - 1), 1.0)
+    steps = np.diff(record.filled(angle)[fresh], prepend=np.nan)
+    steps[0] = steps[1]
+    rates = steps / ticks
+    way = _usual(rates)
+    # The way of one more than its stamp says: a reading was lost there. A row that is missing says so itself.
+    clear = np.abs(way) > STEPS * quantisation_step(record.channels[angle][record.trusted[angle]])
+    lost = find_spikes(rates, np.ones(len(rates), dtype=bool)) & clear
+    lost &= np.abs(steps - (ticks + 1.0) * way) < 0.5 * np.abs(way)
+    number = np.cumsum(ticks + lost)
     taken = taut_string(number, time[fresh] - OLDEST * period, time[fresh])
     return Clock(taken - taken[0], repeated, int(lost.sum()))
 

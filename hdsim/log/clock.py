@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,13 @@ Array = NDArray[np.float64]
 
 #: Range of what a constant rate leaves of stamps in whole ticks, in ticks: one, and the rate's own error.
 WHOLE_TICK = 1.05
+#: The same where a sample may be missing a few before it is missed; and longest tick in which one that is
+#: missing shows at all, in periods of the samples.
+LATE_TICK, QUICK = 1.2, 2.0
+#: Most samples of a recording that are looked for as missing.
+MOST_MISSING = 40
+#: Rounds in which their rate is found, each with the places of those that were missing at the last one.
+REFINED = 3
 _SECOND_DAY = np.datetime64("1970-01-02", "ns")
 
 
@@ -34,8 +43,8 @@ def seconds(recorded: Numbers, unit: str, wraps_at: float | None, place: str) ->
 def spread(time: Array, place: str) -> Array:
     """Times for samples that share one, stretch by stretch between missed ticks of the clock.
 
-    Where one constant rate meets every stamp to a tick, it is that of the samples; else they are spread
-    evenly over the sample number between changes of the clock.
+    Where one constant rate meets every stamp to a tick, it is that of the samples, but for those that are
+    missing; else they are spread evenly over the sample number between changes of the clock.
     """
     steps = np.diff(time)
     if (steps < 0).any():
@@ -44,10 +53,58 @@ def spread(time: Array, place: str) -> Array:
     if not (steps > 0).any():
         raise InputError(f"{place}: the clock never advances")
     tick = float(np.median(steps[steps > 0]))
+    if (steps == 0).any() and (even := _one_rate(time, tick)) is not None:
+        return even
     missed = steps > 1.5 * tick
     stretches = np.split(time, np.flatnonzero(missed) + 1)
     period = (time[-1] - time[0] - steps[missed].sum()) / max(len(time) - len(stretches), 1)
     return np.concatenate([_evened(stretch, tick, period) for stretch in stretches])
+
+
+def _one_rate(time: Array, tick: float) -> Array | None:
+    """The times of samples at one constant rate of which a few are missing; None where there is none.
+
+    A clock that is about as quick as the samples shows two at one tick and none at the next, which is no
+    sample that is missing: that one leaves all later ones late. The fewest count.
+    """
+    number = np.arange(len(time), dtype=np.float64)
+    found = _at_one_rate(time, number, tick, WHOLE_TICK)
+    span = time[-1] - time[0]
+    if found is not None or tick > QUICK * span / (len(time) - 1):
+        return found
+    for missing in range(MOST_MISSING + 1):
+        # The stamps at both ends are each a tick late at most.
+        for ends in (0.0, -0.5, 0.5):
+            rate = (span + ends * tick) / (len(time) - 1 + missing)
+            for _ in range(REFINED):
+                number = _counted(time, tick, rate)
+                found = _at_one_rate(time, number, tick, LATE_TICK)
+                if found is not None:
+                    return found
+                rate = np.polyfit(number, time, 1)[0]
+    return None
+
+
+def _at_one_rate(time: Array, number: Array, tick: float, most: float) -> Array | None:
+    """Times of numbered samples at their mean rate; None where it misses stamps by more than so many ticks."""
+    rate, start = np.polyfit(number, time, 1)
+    rest = time - (start + rate * number)
+    if np.ptp(rest) > most * tick:
+        return None
+    # A clock that counts whole ticks is late by half of one on the average.
+    return np.asarray(start + rate * number + 0.5 * (rest.min() + rest.max() + tick))
+
+
+def _counted(time: Array, tick: float, rate: float) -> Array:
+    """Numbers of samples at a rate: one is missing where a stamp is later than any before by over a tick."""
+    phase = time - rate * np.arange(len(time))
+    number, missing, least = np.empty(len(time)), 0, math.inf
+    for k, own in enumerate(phase.tolist()):
+        least = min(least, own - rate * missing)
+        while own - rate * missing > least + WHOLE_TICK * tick:
+            missing += 1
+        number[k] = k + missing
+    return number
 
 
 def _evened(time: Array, tick: float, period: float) -> Array:
@@ -56,11 +113,9 @@ def _evened(time: Array, tick: float, period: float) -> Array:
     first = np.flatnonzero(np.concatenate([[True], np.diff(time) > 0]))
     if len(first) < 2:
         return np.asarray(time[0] + period * index)
-    rate, start = np.polyfit(index, time, 1)
-    rest = time - (start + rate * index)
-    if np.ptp(rest) <= WHOLE_TICK * tick:
-        # A clock that counts whole ticks is late by half of one on the average.
-        return np.asarray(start + rate * index + 0.5 * (rest.min() + rest.max() + tick))
+    even = _at_one_rate(time, index, tick, WHOLE_TICK)
+    if even is not None:
+        return even
     # After the last change the mean rate goes on.
     rate = (time[first[-1]] - time[0]) / first[-1]
     end = time[first[-1]] + rate * (len(time) - first[-1])

@@ -97,6 +97,22 @@ def test_a_reading_that_was_lost_is_counted():
         assert np.ptp(apart[(row >= first + 400) & (row < last - 400)]) < 0.8 * LOG_S
 
 
+def test_a_row_that_is_missing_is_no_reading_more_than_its_stamp_says():
+    # Rows that a bus has dropped, and rows that repeat the one before; sensor and log have one clock.
+    rng = np.random.default_rng(2)
+    time = LOG_S * np.arange(6000)
+    angle = motion(time) + 2e-6 * rng.standard_normal(len(time))
+    torque = 5.0 * np.sin(motion(time)) + 0.02 * rng.standard_normal(len(time))
+    stale, gone = [900, 2650, 4210], [1400, 3301, 3302, 5200]
+    for row in stale:
+        angle[row], torque[row] = angle[row - 1], torque[row - 1]
+    kept = np.delete(np.arange(len(time)), gone)
+    record = Record("log", time[kept], {"output_angle": angle[kept], "motor_torque": torque[kept]})
+    clock = own_clock(record)
+    assert clock.repeated.sum() == clock.lost == len(stale)
+    np.testing.assert_allclose(clock.time, time[kept][~clock.repeated], atol=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["noise", "rest", "one channel at rest"])
 def test_what_repeats_by_itself_is_no_clock(kind):
     time = LOG_S * np.arange(3000)

@@ -31,6 +31,22 @@ def test_a_constant_rate_is_seen_through_a_coarse_clock_and_a_gap(tmp_path):
         np.testing.assert_allclose(found.time[part], true[part], atol=0.0025)
 
 
+@pytest.mark.parametrize("missing", [[], [700, 1500, 1501, 3400]])
+def test_a_clock_as_quick_as_the_samples_shows_some_of_them_twice(tmp_path, missing):
+    # Stamps in whole milliseconds, each sample a hair before or after one: 20, 20, 22, 23, 23, 25 ms ...
+    whole = np.arange(2, 4002)
+    early = np.random.default_rng(4).random(len(whole)) < 0.4
+    true, stamps = (np.delete(values, missing) for values in (whole * 1e-3, (whole - early) * 1e-3))
+    mapping = BASE.replace("unit: s", "unit: s, quantised: true")
+    found = simple(tmp_path, stamps, true, mapping)
+    apart = found.time - true
+    late = np.abs(apart - np.median(apart)) > 1e-5
+    # Only of a few samples beside a missing one is it unknown which it was.
+    assert late.sum() <= 8 * len(missing)
+    assert np.abs(apart - np.median(apart)).max() < 1.1e-3
+    assert (np.abs(np.diff(found.time) / np.diff(true) - 1) > 0.1).sum() <= 2 * len(missing)
+
+
 def test_a_rate_that_changes_is_not_taken_for_a_constant_one(tmp_path):
     true = np.cumsum(np.where(np.arange(600) < 300, 0.002, 0.003))
     mapping = BASE.replace("unit: s", "unit: s, quantised: true")
