@@ -15,9 +15,8 @@ Array = NDArray[np.float64]
 
 #: Range of what a constant rate leaves of stamps in whole ticks, in ticks: one, and the rate's own error.
 WHOLE_TICK = 1.05
-#: The same where a sample may be missing a few before it is missed; and longest tick in which one that is
-#: missing shows at all, in periods of the samples.
-LATE_TICK, QUICK = 1.2, 2.0
+#: Longest tick in which a sample that is missing shows at all, in periods of the samples.
+QUICK = 2.0
 #: Most samples of a recording that are looked for as missing.
 MOST_MISSING = 40
 #: Rounds in which their rate is found, each with the places of those that were missing at the last one.
@@ -68,7 +67,7 @@ def _one_rate(time: Array, tick: float) -> Array | None:
     sample that is missing: that one leaves all later ones late. The fewest count.
     """
     number = np.arange(len(time), dtype=np.float64)
-    found = _at_one_rate(time, number, tick, WHOLE_TICK)
+    found = _at_one_rate(time, number, tick)
     span = time[-1] - time[0]
     if found is not None or tick > QUICK * span / (len(time) - 1):
         return found
@@ -78,21 +77,34 @@ def _one_rate(time: Array, tick: float) -> Array | None:
             rate = (span + ends * tick) / (len(time) - 1 + missing)
             for _ in range(REFINED):
                 number = _counted(time, tick, rate)
-                found = _at_one_rate(time, number, tick, LATE_TICK)
+                rate = _rate(time, number, tick)
+                found = _at_one_rate(time, number, tick, rate)
                 if found is not None:
                     return found
-                rate = np.polyfit(number, time, 1)[0]
     return None
 
 
-def _at_one_rate(time: Array, number: Array, tick: float, most: float) -> Array | None:
-    """Times of numbered samples at their mean rate; None where it misses stamps by more than so many ticks."""
-    rate, start = np.polyfit(number, time, 1)
-    rest = time - (start + rate * number)
-    if np.ptp(rest) > most * tick:
+def _rate(time: Array, number: Array, tick: float) -> float:
+    """The rate that leaves the least range of the stamps: which of two ticks they take is not by chance."""
+    from scipy.optimize import minimize_scalar
+
+    rate = float(np.polyfit(number, time, 1)[0])
+    reach = 2.0 * tick / (number[-1] - number[0])
+    found = minimize_scalar(
+        lambda own: float(np.ptp(time - own * number)),
+        bounds=(rate - reach, rate + reach), method="bounded", options={"xatol": 1e-3 * reach},
+    )  # fmt: skip
+    return float(found.x)
+
+
+def _at_one_rate(time: Array, number: Array, tick: float, rate: float | None = None) -> Array | None:
+    """Times of numbered samples at their mean rate; None where it misses stamps by more than a tick."""
+    rate = float(np.polyfit(number, time, 1)[0]) if rate is None else rate
+    rest = time - rate * number
+    if np.ptp(rest) > WHOLE_TICK * tick:
         return None
     # A clock that counts whole ticks is late by half of one on the average.
-    return np.asarray(start + rate * number + 0.5 * (rest.min() + rest.max() + tick))
+    return np.asarray(rate * number + 0.5 * (rest.min() + rest.max() + tick))
 
 
 def _counted(time: Array, tick: float, rate: float) -> Array:
@@ -113,7 +125,7 @@ def _evened(time: Array, tick: float, period: float) -> Array:
     first = np.flatnonzero(np.concatenate([[True], np.diff(time) > 0]))
     if len(first) < 2:
         return np.asarray(time[0] + period * index)
-    even = _at_one_rate(time, index, tick, WHOLE_TICK)
+    even = _at_one_rate(time, index, tick)
     if even is not None:
         return even
     # After the last change the mean rate goes on.
