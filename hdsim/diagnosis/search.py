@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines
+from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines, waits
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.late import lines_shown, read_late
@@ -116,12 +116,11 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
     found.fit = together(bench, found.fit)
     if found.named:
         tell = during("again", "testing each effect beside the others")
-        count = len(found.named)
         found.fit = revised(bench, found.fit, found.named, tell)
-        if len(found.named) < count:
+        if any(waits(one, found.named) for one in found.named):
             # Beside a name that was needless others may have been wrong, or as good as the one that is left.
             before = found.stages[0].screening
-            asked = again(bench, base, found.fit, found.named, tell, before=before, every=True)
+            asked = again(bench, base, found.fit, found.named, tell, before=before, last=True)
             found.fit = together(bench, asked)
             found.fit = revised(bench, found.fit, found.named, tell)
         if len(found.named) == 1:
@@ -170,6 +169,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     if named is None:
         return None
     stage.named = named
+    named.beside = frozenset(one.name for one in found.named)
     found.named.append(named)
     current = named.fit
     if len(found.named) == 1:
