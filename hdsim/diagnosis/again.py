@@ -38,7 +38,7 @@ def again(
     tell: Step,
     *,
     before: Screening | None = None,
-    last: bool = False,
+    ended: bool = False,
     lines: Sequence[Line] = (),
 ) -> Fit:
     """Ask every name again.
@@ -54,7 +54,7 @@ def again(
         names: in the order of ``current.state.added``; changed in place.
         tell: told what is being done.
         before: the first screening.
-        last: all are there: of those that have others beside them than when they were asked, also ask the
+        ended: all are there: of those that have others beside them than when they were asked, also ask the
             ones that had to wait for that, or had one beside them that is gone.
         lines: that have come to light since; names that read their orders from such lines are asked, too.
     """
@@ -63,8 +63,8 @@ def again(
     k = 0
     while k < len(names):
         stuck = current.state.added[k].at_limit
-        asked = stuck or (last and waits(names[k], names)) or _reads(current.state.added[k], lit)
-        if not asked and (last or _clear(names[k], names[-1])):
+        asked = stuck or (ended and waits(names[k], names)) or _reads(current.state.added[k], lit)
+        if not asked and (ended or _clear(names[k], names[-1])):
             k += 1
             continue
         no_news = bench.power(current.predictions) > (1.0 - NEWS) * first

@@ -15,6 +15,7 @@ from hdsim.diagnosis.evidence import (
     RestEvidence,
     StageEvidence,
 )
+from hdsim.diagnosis.held import held_of, own_held
 from hdsim.diagnosis.locate import SHARP, Location
 from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.search import Search, Stage, shown_in
@@ -22,12 +23,9 @@ from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.flanks import nothing_but_flanks, only_flanks
 from hdsim.estimate.found import Gap
-from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Array
 from hdsim.estimate.refit import Refit
 from hdsim.estimate.state import Added
-from hdsim.estimate.unwound import turned_to_zero
 
 #: Places of a stage that are kept.
 PLACES = 12
@@ -54,8 +52,10 @@ def collect(
     left = last.structured * found.left.power
     project = found.left.project
     shown = shown_in(bench, found.fit)
-    held = _held(bench, predictions["refit"], predictions["after"]) if found.named else HeldOutEvidence()
-    changed = _held(bench, predictions["before"], predictions["after"]) if found.named else HeldOutEvidence()
+    held = held_of(bench, predictions["refit"], predictions["after"]) if found.named else HeldOutEvidence()
+    changed = (
+        held_of(bench, predictions["before"], predictions["after"]) if found.named else HeldOutEvidence()
+    )
     may_hold = float(np.clip(held.slope + WORSE * held.spread, 0.0, 1.0))
     power = bench.power(base.fit.predictions)
     return Evidence(
@@ -67,7 +67,7 @@ def collect(
                 shown[k] or catalogue()[one.name].signature.channels,
                 last,
                 explained if len(found.named) == 1 else one.worth,
-                _own_held(bench, one, predictions["after"]),
+                own_held(bench, one.less, predictions["after"]),
             )
             for k, one in enumerate(found.named)
         ],
@@ -81,9 +81,16 @@ def collect(
         if nothing_but_flanks(bench, found.left.power, project)
         else _rest(bench, found.fit.predictions),
         rest_before=_rest(bench, base.fit.predictions),
-        fell=max((1.0 - g.refit / g.before for g in gap.values() if g.before > 0), default=0.0),
+        fell=_fell(gap),
         moved=[i.name for i in base.moved],
     )
+
+
+def _fell(gap: Mapping[str, Gap]) -> float:
+    """Largest relative fall of a gap by the re-fit, if all together are better for it."""
+    known = [g for g in gap.values() if g.before > 0 and g.noise > 0]
+    before, refit = (sum((getattr(g, at) / g.noise) ** 2 for g in known) for at in ("before", "refit"))
+    return max((1.0 - g.refit / g.before for g in known), default=0.0) if refit < before else 0.0
 
 
 def _stage(stage: Stage) -> StageEvidence:
@@ -106,27 +113,6 @@ def _stage(stage: Stage) -> StageEvidence:
         candidates=stage.named.candidates if stage.named else [],
         named=stage.named.name if stage.named else "",
     )
-
-
-def _own_held(bench: Bench, one: Named, predictions: Sequence[Array]) -> HeldOutEvidence | None:
-    """What held-out data say of one effect of several, against all others fitted without it.
-
-    The numbers of the others are fitted anew: those that were fitted beside it are wrong without it, and
-    nearly any effect would mend that.
-    """
-    if one.less is None:
-        return None
-    try:
-        without = turned_to_zero(bench, one.less.state)
-    except PredictionError:
-        return None
-    return _held(bench, without, predictions)
-
-
-def _held(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> HeldOutEvidence:
-    """How much of what makes one model another shows in held-out data."""
-    slope, spread = borne_out(bench, before, after)
-    return HeldOutEvidence(slope=slope, spread=min(spread, 1e6))
 
 
 def _law(

@@ -72,18 +72,13 @@ def decide(evidence: Evidence, rules: Rules = RULES) -> Decision:
             because=because,
         )
     # An effect that is not believed tells of nothing by itself: what was there without it is asked.
-    left, rest = evidence.left, evidence.rest
-    structured = evidence.left_chance <= rules.chance
-    because.append(
-        Reason(
-            rule="structure is left by chance",
-            seen=evidence.left_chance,
-            limit=rules.chance,
-            holds=structured,
-        )
-    )
+    left, rest, chance = evidence.left, evidence.rest, evidence.left_chance
     if evidence.laws:
-        left, rest, structured = evidence.patterned, evidence.rest_before, True
+        left, rest, chance = evidence.patterned, evidence.rest_before, evidence.pattern_chance
+    structured = chance <= rules.chance or bool(evidence.laws)
+    because.append(
+        Reason(rule="structure is left by chance", seen=chance, limit=rules.chance, holds=structured)
+    )
     structured = structured and left >= rules.structured
     times = rest.times_noise if rest is not None else 0.0
     for rule, seen, limit, holds in (

@@ -137,6 +137,13 @@ class Evidence(Part):
     rest_before: RestEvidence | None = None
     """The same of the re-fitted model, without the added effects."""
     fell: float = 0.0
-    """Largest relative fall of a held-out gap by the re-fit."""
+    """Largest relative fall of a held-out gap by the re-fit; 0 where all channels together, each in units of
+    its noise, are no better for it."""
     moved: list[str] = []
     """Numbers of the base whose interval excludes what the model had."""
+
+    @property
+    def pattern_chance(self) -> float:
+        """Smallest p-value of what was observed, or of what the search has found."""
+        chances = [stage.structured_chance for stage in self.stages]
+        return min([*chances, *(law.chance for law in self.laws)], default=1.0)

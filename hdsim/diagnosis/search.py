@@ -18,6 +18,7 @@ import numpy as np
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines, waits
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.finer import each_refined, refined
+from hdsim.diagnosis.held import hopeless
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
 from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
@@ -120,7 +121,7 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
         if any(waits(one, found.named) for one in found.named):
             # Beside a name that was needless others may have been wrong, or as good as the one that is left.
             before = found.stages[0].screening
-            asked = again(bench, base, found.fit, found.named, tell, before=before, last=True)
+            asked = again(bench, base, found.fit, found.named, tell, before=before, ended=True)
             found.fit = together(bench, asked)
             found.fit = revised(bench, found.fit, found.named, tell)
         if len(found.named) == 1:
@@ -169,6 +170,8 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     if named is None:
         return None
     stage.named = named
+    if len(found.named) > 1 and hopeless(bench, named.fit, named):
+        return None
     named.beside = frozenset(one.name for one in found.named)
     found.named.append(named)
     current = named.fit
@@ -192,8 +195,9 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         align(bench, current)
         reweigh(bench, current)
         left, now = (bench.power(each.predictions) for each in (found.fit, current))
-        if len(found.named) >= len(known) and now >= left:
-            # Names that take each other's place without explaining more would go on doing so.
+        # Names that take each other's place without explaining more would go on doing so.
+        rounds = len(found.named) >= len(known) and now >= left
+        if rounds or (len(found.named) == 2 and hopeless(bench, current, found.named[-1])):
             found.named[:] = known
             return None
     return current

@@ -153,21 +153,16 @@ class Findings:
         return ([best.name], min(best.explained, 1.0)) if best is not None else ([], 0.0)
 
     @property
-    def pattern_chance(self) -> float:
-        """Smallest p-value of what was observed, or of what the search has found."""
-        chances = [stage.structured_chance for stage in self.evidence.stages]
-        return min([*chances, *(law.chance for law in self.evidence.laws)], default=1.0)
-
-    @property
     def unexplained(self) -> float:
         """Share of the systematic residual that the identified effects do not explain; 0 without one."""
         return 1.0 - self.evidence.explained if self.verdict.effects and self.evidence.laws else 0.0
 
     @property
-    def left_most(self) -> tuple[str, float]:
-        """The channel with the largest residual relative to its noise, and that ratio; 0 where unknown."""
+    def left_most(self) -> tuple[str, str, float]:
+        """Training record and channel with the largest residual over its noise, and that ratio; or 0."""
         rest = self.evidence.rest
-        return (rest.channel, rest.times_noise) if rest and math.isfinite(rest.times_noise) else ("", 0.0)
+        known = rest is not None and math.isfinite(rest.times_noise)
+        return (rest.record, rest.channel, rest.times_noise) if rest and known else ("", "", 0.0)
 
 
 def gather(diagnosis: Diagnosis) -> Findings:

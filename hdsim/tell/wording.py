@@ -242,9 +242,9 @@ def _nothing_more(found: Findings) -> str:
 def much_left(found: Findings) -> str:
     """The unexplained residual, where it is too large to call anything very sure; empty else."""
     said = []
-    channel, most = found.left_most
+    record, channel, most = found.left_most
     if most > MUCH_NOISE:
-        said.append(f"{times(most)} the noise of the {spoken(channel)}")
+        said.append(f"{times(most)} the noise of the {spoken(channel)} in {record}")
     if found.unexplained > MUCH_STRUCTURE:
         said.append(f"{percent(found.unexplained)} of the systematic residual")
     return " and ".join(said) + (" remains" if len(said) == 1 else " remain") if said else ""
@@ -297,14 +297,14 @@ def _of_the_unknown(found: Findings) -> Sureness:
             0, "From noise alone the residual would be at the noise level in every stretch of a record."
         )
         return Sureness(words, f"a residual of {times(rest.times_noise)} the noise", tuple(said))
-    chance = found.pattern_chance
+    chance = found.evidence.pattern_chance
     if stage is not None:
         said.insert(
             0,
             f"p-value: noise alone shows as strong a pattern in {below(chance)} of cases; "
             f"{percent(stage.structured)} of the residual, weighted by the noise, is systematic.",
         )
-    most = found.left_most[1]
+    most = found.left_most[2]
     if chance > RULES.chance and most > RULES.rest:
         return Sureness(words, f"the residual is {times(most)} the noise", tuple(said))
     if chance > RULES.chance:

@@ -7,11 +7,12 @@ from diagnose_bench import scenario
 from test_small_names import hidden
 
 from hdsim.diagnosis.again import left_of
-from hdsim.diagnosis.collect import collect
+from hdsim.diagnosis.collect import _fell, collect
 from hdsim.diagnosis.decide import decide
 from hdsim.diagnosis.locate import SHARP, locate
 from hdsim.diagnosis.search import Search, Stage
 from hdsim.diagnosis.workflow import diagnose
+from hdsim.estimate.found import Gap
 from hdsim.estimate.refit import together
 
 
@@ -41,3 +42,20 @@ def test_an_error_of_the_outputs_encoder_is_nothing_that_a_motors_unbalance_leav
     assert law.own_first is False or evidence.left_chance > 0.02
     (seen,) = (r.seen for r in decide(evidence).because if r.rule.endswith("own coordinate that it leaves"))
     assert seen == pytest.approx(law.own_left)
+
+
+@pytest.mark.parametrize(
+    ("angle", "fell"),
+    [
+        (1.21, 0.03),
+        # A torque that falls by a hair beside an angle that doubles is no better model.
+        (2.55, 0.0),
+    ],
+)
+def test_a_re_fit_closes_a_gap_where_all_channels_together_are_better_for_it(angle, fell):
+    same = {"after": 0.0, "variation": 9.0, "unit": "N m"}
+    gaps = {
+        "motor_torque": Gap(before=1.62, refit=0.97 * 1.62, noise=1.0, **same),
+        "output_angle": Gap(before=1.21e-5, refit=angle * 1e-5, noise=1e-5, **same),
+    }
+    assert _fell(gaps) == pytest.approx(fell)

@@ -34,6 +34,16 @@ def test_a_law_that_explains_little_is_not():
     assert decide(little).kind == "unknown"
 
 
+def test_the_p_value_of_what_is_unknown_is_the_one_that_is_told():
+    """A law that is not believed was found with a p-value; what it leaves has another, which is not asked."""
+    weak = found(law(chance=0.0075), explained=0.3, left_chance=0.025, held=HeldOutEvidence(slope=-0.8))
+    decision = decide(weak)
+    assert decision.kind == "unknown"
+    (asked,) = (reason for reason in decision.because if reason.rule == "structure is left by chance")
+    assert asked.seen == weak.pattern_chance == 0.0075
+    assert asked.holds
+
+
 def test_what_another_missing_effect_leaves_does_not_take_a_name_away():
     """A real joint lacks friction and more: its friction is clear, though half of the structure is left."""
     held = HeldOutEvidence(slope=1.0, spread=0.2)

@@ -64,9 +64,12 @@ def test_a_name_is_as_sure_as_it_is_likely(probability, words, number):
 @pytest.mark.parametrize(
     ("evidence", "left"),
     [
-        ({"rest": rest(4.2)}, "4.2 times the noise of the motor torque"),
+        ({"rest": rest(4.2)}, "4.2 times the noise of the motor torque in a.csv"),
         ({"explained": 0.84}, "16\u00a0% of the systematic residual"),
-        ({"rest": rest(50.0), "explained": 0.23}, "50 times the noise of the motor torque and 77\u00a0%"),
+        (
+            {"rest": rest(50.0), "explained": 0.23},
+            "50 times the noise of the motor torque in a.csv and 77\u00a0%",
+        ),
     ],
 )
 def test_nothing_is_very_sure_while_much_is_left(evidence, left):
@@ -95,7 +98,7 @@ def test_numbers_that_are_far_off_are_not_very_sure_while_much_is_left():
     assert sureness(told(PARAMETER, **fields)).words == "Very sure"
     left = told(PARAMETER.model_copy(update={"rest": rest(3.0)}), **{"verdict": "parameter"} | fields)
     assert sureness(left).sentence.startswith("Sure: ")
-    assert sureness(left).sentence.endswith("But 3.0 times the noise of the motor torque remains.")
+    assert sureness(left).sentence.endswith("But 3.0 times the noise of the motor torque in a.csv remains.")
 
 
 def test_a_group_is_sure_as_a_group():

@@ -1,0 +1,89 @@
+"""What held-out data say of effects, and whether a further one is worth going on with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hdsim.diagnosis.decide import probability
+from hdsim.diagnosis.evidence import Evidence, HeldOutEvidence, LawEvidence
+from hdsim.diagnosis.locate import SHARP
+from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.revise import needed, without
+from hdsim.diagnosis.rules import RULES
+from hdsim.effects import catalogue
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.prove import borne_out
+from hdsim.estimate.records import Array
+from hdsim.estimate.unwound import turned_to_zero
+
+#: Probability of a further name, as of the last evidence, below which the search does not go on with it
+#: (chosen: a tenth of what a name needs in the end, for its numbers and those of the others are rough yet).
+HOPELESS = 0.05
+
+
+def held_of(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> HeldOutEvidence:
+    """How much of what makes one model another shows in held-out data.
+
+    Args:
+        bench: the measured series.
+        before: predictions of all series by the one.
+        after: likewise by the other.
+    """
+    slope, spread = borne_out(bench, before, after)
+    return HeldOutEvidence(slope=slope, spread=min(spread, 1e6))
+
+
+def own_held(bench: Bench, less: Fit | None, predictions: Sequence[Array]) -> HeldOutEvidence | None:
+    """What held-out data say of one effect of several, against all others fitted without it.
+
+    The numbers of the others are fitted anew: those that were fitted beside it are wrong without it, and
+    nearly any effect would mend that.
+
+    Args:
+        bench: the measured series.
+        less: the model without it; None where it is none.
+        predictions: of all series by the model with it.
+    """
+    if less is None:
+        return None
+    try:
+        without_it = turned_to_zero(bench, less.state)
+    except PredictionError:
+        return None
+    return held_of(bench, without_it, predictions)
+
+
+def hopeless(bench: Bench, current: Fit, newest: Named) -> bool:
+    """Whether the newest of several names would not be believed, whatever all of them explain together.
+
+    Of a name that is not believed in the end nothing stays, and each costs the fits of all that look like it
+    and like those before it. What it is judged by is what it is judged by then.
+
+    Args:
+        bench: the measured series.
+        current: the model with it, the last of its effects.
+        newest: the name.
+    """
+    rest = without(bench, current, len(current.state.added) - 1, made_up=True)
+    try:
+        held = own_held(bench, rest, turned_to_zero(bench, current.state))
+    except PredictionError:
+        return False
+    if rest is None or held is None:
+        return False
+    added = current.state.added[-1]
+    sharp = added.lives_in[0] == SHARP
+    part = needed(bench, rest, current)
+    law = LawEvidence(
+        name=newest.name,
+        chance=newest.chance,
+        sampled=newest.confidence,
+        gain=newest.gain,
+        needed=max(part, newest.of_lines) if sharp else part,
+        exact=catalogue()[newest.name].signature.exact,
+        sharp=sharp,
+        held=held,
+    )
+    return probability(Evidence(laws=[law, law], explained=1.0), 1, RULES, []) < HOPELESS
