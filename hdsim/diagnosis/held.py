@@ -18,9 +18,10 @@ from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Array
 from hdsim.estimate.unwound import turned_to_zero
 
-#: Probability of a further name, as of the last evidence, below which the search does not go on with it
-#: (chosen: a tenth of what a name needs in the end, for its numbers and those of the others are rough yet).
-HOPELESS = 0.05
+#: Probability of a further name below which the search does not go on with it (chosen: half of what a name
+#: needs in the end, for its numbers and those of the others are rough yet; of pairs of numpy, even seeds 212
+#: to 226, ten right ones have 0.97 and more; three wrong ones beside a stiffening have 0.06, 0.2 and less).
+HOPELESS = 0.25
 
 
 def held_of(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> HeldOutEvidence:

@@ -41,6 +41,8 @@ SMOOTHED = float(np.sqrt(np.pi / 2.0))
 #: Samples on either side that count with one of unknown sign: where friction's jump can be seen, the motion's
 #: spline has knots that many samples apart, and smooths the jump in acceleration over them.
 BESIDE = 4
+#: Factor between smoothing speeds of a sign that are tried.
+CREEPS = 3.0
 #: Log-likelihood by which the sharper sign must be the better one: "very strong" (Kass and Raftery 1995).
 CLEARLY = 5.0
 
@@ -98,11 +100,56 @@ def hear_standstill(
             smooth = end_of(found)
             take(sharp)
             sharper = end_of(anew())
-            if _likelier(bench, smooth.predictions, sharper.predictions):
+            better = _likelier(bench, smooth.predictions, sharper.predictions)
+
+            def under(speed: float) -> Fit:
+                take([max(speed, own) for own in sharp])
+                return end_of(anew())
+
+            ends = (min(sharp), max(signs)) if better else (max(signs), min(sharp))
+            between = _creeping(bench, sharper if better else smooth, ends, under)
+            if between is not None:
+                return between
+            if better:
+                take(sharp)
                 return sharper
     take(signs)
     counted.put_back()
     return found
+
+
+def _creeping(
+    bench: Bench, best: Fit, ends: tuple[float, float], under: Callable[[float], Fit]
+) -> Fit | None:
+    """The fit under a sign between two, where it explains most of what the better of them leaves.
+
+    A shaft may creep a little before it slips. A law of friction that is missing leaves more than that.
+
+    Args:
+        bench: the measured series, weighed.
+        best: the fit under the better sign.
+        ends: smoothing speeds of that sign and of the other one, rad/s.
+        under: makes a fit under a sign of a smoothing speed.
+    """
+    speed, other = ends
+    step = CREEPS if other > speed else 1.0 / CREEPS
+    noise, first = bench.noise_power, bench.power(best.predictions)
+    found = best
+    with contextlib.suppress(PredictionError):
+        while abs(math.log(other / speed)) > math.log(CREEPS):
+            tried = under(step * speed)
+            if not _likelier(bench, found.predictions, tried.predictions):
+                break
+            found, speed = tried, step * speed
+        if found is best or bench.power(found.predictions) - noise > 0.5 * (first - noise):
+            return None
+        for finer in (step**0.5, step**-0.5, step**0.25, step**-0.25):
+            tried = under(finer * speed)
+            if bench.power(tried.predictions) < bench.power(found.predictions):
+                found, speed = tried, finer * speed
+        # The predictors have the last one's.
+        return under(speed)
+    return None
 
 
 def has_a_sign(state: State) -> bool:
