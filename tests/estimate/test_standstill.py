@@ -101,6 +101,8 @@ def test_each_sign_is_judged_by_a_fit_at_its_end(smooth, sharp, held_nm, sticks)
         series=[series],
         predict=lambda _: [np.tanh(speed / predictor.smoothing)],
         residuals=lambda predictions: [noise - predictions[0]],
+        power=lambda predictions: float(np.sum((noise - predictions[0]) ** 2) / 0.1**2),
+        noise_power=2000.0,
     )
     fits = {
         (sign, end): SimpleNamespace(predictions=[left * wave + held])
@@ -124,8 +126,8 @@ def test_each_sign_is_judged_by_a_fit_at_its_end(smooth, sharp, held_nm, sticks)
     assert series.train.all() != sticks  # rests count where the sign is smooth
 
 
-def creeping(base):
-    friction = base.drive.friction.model_copy(update={"smoothing_velocity_rad_per_s": 0.5})
+def creeping(base, speed=0.5):
+    friction = base.drive.friction.model_copy(update={"smoothing_velocity_rad_per_s": speed})
     return base.model_copy(update={"drive": base.drive.model_copy(update={"friction": friction})})
 
 
@@ -136,6 +138,16 @@ def test_a_drive_that_creeps_is_not_taken_for_one_that_sticks(base):
     assert bench.predictors[0].smoothing == 0.5
     assert counted[series.block > 0].all()
     assert np.std(rest[counted]) < 1.1 * series.noise
+
+
+@pytest.mark.slow
+def test_a_drive_that_creeps_a_little_before_it_slips_lacks_no_friction(base):
+    found = diagnose([recorded(creeping(base, 0.03))], base)
+    (predictor,) = found.bench.predictors
+    assert predictor.smoothing == pytest.approx(0.03, rel=0.3)
+    assert found.verdict.verdict == "nothing"
+    gap = found.verdict.gap["motor_torque"]
+    assert gap.after < 1.1 * gap.noise
 
 
 @pytest.mark.slow
