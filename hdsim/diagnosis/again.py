@@ -38,14 +38,13 @@ def again(
     tell: Step,
     *,
     before: Screening | None = None,
-    ended: bool = False,
+    every: bool = False,
     lines: Sequence[Line] = (),
 ) -> Fit:
     """Ask every name again.
 
     The last one was asked beside the others, and is so again only where they have changed since, or where it
-    has gone to the end of its range. One that explained far more than the newest is asked when all are there:
-    each newcomer would only have all of its rivals fitted anew.
+    has gone to the end of its range.
 
     Args:
         bench: the measured series.
@@ -54,8 +53,7 @@ def again(
         names: in the order of ``current.state.added``; changed in place.
         tell: told what is being done.
         before: the first screening.
-        ended: all are there: of those that have others beside them than when they were asked, also ask the
-            ones that had to wait for that, or had one beside them that is gone.
+        every: ask also those that are clear.
         lines: that have come to light since; names that read their orders from such lines are asked, too.
     """
     lit = [(line.channel, line.order) for line in lines]
@@ -63,8 +61,8 @@ def again(
     k = 0
     while k < len(names):
         stuck = current.state.added[k].at_limit
-        asked = stuck or (ended and waits(names[k], names)) or _reads(current.state.added[k], lit)
-        if not asked and (ended or _clear(names[k], names[-1])):
+        asked = stuck or every or _reads(current.state.added[k], lit)
+        if not asked and _clear(names[k], names[-1]):
             k += 1
             continue
         no_news = bench.power(current.predictions) > (1.0 - NEWS) * first
@@ -126,7 +124,6 @@ def again(
             own.gain, own.of_lines, own.alike = names[k].gain, names[k].of_lines, names[k].alike
             own.instead_of = names[k].instead_of if own.name == names[k].name else frozenset()
             names[k] = own
-        names[k].beside = frozenset(one.name for one in names if one is not names[k])
         k += 1
     return current
 
@@ -182,22 +179,9 @@ def _inherit(one: Named, other: Named) -> None:
     one.gain = max(one.gain, other.gain)
 
 
-def waits(one: Named, names: Sequence[Named]) -> bool:
-    """Whether a name is to be asked beside the others: some have come since that it waited for, or gone."""
-    others = [other for other in names if other is not one]
-    if one.beside - {other.name for other in others}:
-        return True
-    return not all(other.name in one.beside or _won_clearly(one, other) for other in others)
-
-
 def _clear(one: Named, newest: Named) -> bool:
-    """Whether a name need not be asked again yet: the newest cannot have changed it, or is far smaller."""
-    return one is not newest and (newest.won < NEWS * one.won or _won_clearly(one, newest))
-
-
-def _won_clearly(one: Named, newest: Named) -> bool:
     """Whether a name won so clearly that what came since can't have changed it."""
-    return one.confidence >= CLEAR and not one.group and newest.gain < NEWS * one.gain
+    return one is not newest and one.confidence >= CLEAR and not one.group and newest.gain < NEWS * one.gain
 
 
 def left_of(bench: Bench, current: Fit) -> Residual:

@@ -18,10 +18,11 @@ from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Array
 from hdsim.estimate.unwound import turned_to_zero
 
-#: Probability of a further name below which the search does not go on with it (chosen: half of what a name
-#: needs in the end, for its numbers and those of the others are rough yet; of pairs of numpy, even seeds 212
-#: to 226, ten right ones have 0.97 and more; three wrong ones beside a stiffening have 0.06, 0.2 and less).
-HOPELESS = 0.25
+#: Probability of a third or later name below which the search does not go on with it (chosen: a tenth of
+#: what a name needs in the end, for its numbers and those of the others are rough yet; of eight pairs of
+#: numpy, even seeds 214 to 226, right names have 0.97 and more, of a recorded joint 0.57; wrong ones 0.001 to
+#: 0.2, and of that joint a second name that was to be replaced later 0.03: second ones are not asked).
+HOPELESS = 0.05
 
 
 def held_of(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> HeldOutEvidence:
@@ -57,7 +58,7 @@ def own_held(bench: Bench, less: Fit | None, predictions: Sequence[Array]) -> He
 
 
 def hopeless(bench: Bench, current: Fit, newest: Named) -> bool:
-    """Whether the newest of several names would not be believed, whatever all of them explain together.
+    """Whether the newest of three names or more would not be believed, whatever all explain together.
 
     Of a name that is not believed in the end nothing stays, and each costs the fits of all that look like it
     and like those before it. What it is judged by is what it is judged by then.

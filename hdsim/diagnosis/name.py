@@ -69,8 +69,6 @@ class Named:
         candidates: all that were fitted, the best first, as evidence.
         of_left: part of what was left beyond the noise that its fit explained; likewise.
         of_lines: part of the sharp lines that were left that it explained, where it lives there; likewise.
-        won: power that its fit explained, what the priors have against it included.
-        beside: names that were in the model when it was asked last.
         gain: part of the first pass's structure that it explained; set by the search.
         needed: part of what would be missing without it that it explains, beside all others; likewise.
         worth: power that it explains beside all others; likewise, where there are others.
@@ -88,8 +86,6 @@ class Named:
     chance: float
     alternatives: dict[str, Fit]
     candidates: list[CandidateEvidence]
-    won: float = math.inf
-    beside: frozenset[str] = frozenset()
     gain: float = 1.0
     of_left: float = 1.0
     of_lines: float = 0.0
@@ -231,7 +227,6 @@ def name_effect(
         screening.chance,
         {other: each for other, each, _ in results[1:]},
         [_as_evidence(result, results[0], before, most, on_screen[result[0]]) for result in results],
-        explained,
     )
 
 

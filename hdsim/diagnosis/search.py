@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines, waits
+from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.held import hopeless
@@ -117,11 +117,12 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
     found.fit = together(bench, found.fit)
     if found.named:
         tell = during("again", "testing each effect beside the others")
+        count = len(found.named)
         found.fit = revised(bench, found.fit, found.named, tell)
-        if any(waits(one, found.named) for one in found.named):
+        if len(found.named) < count:
             # Beside a name that was needless others may have been wrong, or as good as the one that is left.
             before = found.stages[0].screening
-            asked = again(bench, base, found.fit, found.named, tell, before=before, ended=True)
+            asked = again(bench, base, found.fit, found.named, tell, before=before, every=True)
             found.fit = together(bench, asked)
             found.fit = revised(bench, found.fit, found.named, tell)
         if len(found.named) == 1:
@@ -172,7 +173,6 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     stage.named = named
     if len(found.named) > 1 and hopeless(bench, named.fit, named):
         return None
-    named.beside = frozenset(one.name for one in found.named)
     found.named.append(named)
     current = named.fit
     if len(found.named) == 1:
@@ -195,9 +195,8 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         align(bench, current)
         reweigh(bench, current)
         left, now = (bench.power(each.predictions) for each in (found.fit, current))
-        # Names that take each other's place without explaining more would go on doing so.
-        rounds = len(found.named) >= len(known) and now >= left
-        if rounds or (len(found.named) == 2 and hopeless(bench, current, found.named[-1])):
+        if len(found.named) >= len(known) and now >= left:
+            # Names that take each other's place without explaining more would go on doing so.
             found.named[:] = known
             return None
     return current

@@ -59,10 +59,7 @@ def catalogue_numbers(
     Kept for the next model: a fit makes hundreds that differ in other numbers.
     """
     corners = [torsion.torque_t1_nm, torsion.torque_t2_nm]
-    straight = not beside and torsion.corner_smoothing_nm == 0.0
-    step, numbers = spring_numbers(
-        [partial(catalogue_wind_up, torsion), *beside], corners, largest_torque_nm, straight=straight
-    )
+    step, numbers = spring_numbers([partial(catalogue_wind_up, torsion), *beside], corners, largest_torque_nm)
     numbers.setflags(write=False)
     return step, numbers
 
@@ -111,7 +108,6 @@ def spring_numbers(
     largest_torque_nm: float,
     *,
     scale: float = 1.0,
-    straight: bool = False,
 ) -> tuple[float, Array]:
     """Torque over twist of springs in series, for the compiled mesh: corners, and the rest as a table.
 
@@ -128,7 +124,6 @@ def spring_numbers(
         corners_nm: torques where a wind-up has a corner, up to ``_quartic.CORNERS``.
         largest_torque_nm: end of the table.
         scale: |g| of the arrangement: twist at the ring is scale times, torque 1/scale times the output's.
-        straight: the wind-ups are so between the corners: R is a straight line.
 
     Returns:
         Cell width (rad), and numbers of shape (2 CORNERS + 5 CELLS,): twist (rad) and rise of the stiffness
@@ -144,16 +139,10 @@ def spring_numbers(
     def total(torque: Array) -> Array:
         return np.asarray(scale * np.sum([wind_up(torque) for wind_up in wind_ups], axis=0))
 
-    step = _BESIDE * largest_torque_nm
-    ends = 0.0, largest_torque_nm
-    straight = straight and min(abs(at - end) for at in corners_nm for end in ends) > step
-    if straight:
-        torque = np.unique([0.0, *corners_nm, largest_torque_nm])
-    else:
-        # Denser towards zero, where a play is taken up.
-        near = np.geomspace(1e-6, 1e-1, 400) * largest_torque_nm
-        even = np.linspace(0.0, largest_torque_nm, 4001)
-        torque = np.unique(np.concatenate([even, near, np.asarray(corners_nm)]))
+    # Denser towards zero, where a play is taken up.
+    near = np.geomspace(1e-6, 1e-1, 400) * largest_torque_nm
+    even = np.linspace(0.0, largest_torque_nm, 4001)
+    torque = np.unique(np.concatenate([even, near, np.asarray(corners_nm)]))
     apart = np.diff(torque, prepend=-1.0) > 1e-10 * largest_torque_nm
     torque = torque[apart & (torque <= largest_torque_nm)]
     twist = total(torque)
@@ -161,6 +150,7 @@ def spring_numbers(
         bad = torque[int(np.argmax(np.diff(twist) <= 0))]
         raise PhysicsError(f"the torsion chain's twist must grow with torque; it does not at {bad:.4g} N m")
     corners = np.zeros((CORNERS, 2))
+    step = _BESIDE * largest_torque_nm
     inner = np.unique([corner for corner in corners_nm if step < corner < largest_torque_nm - step])
     here = total(inner)
     corners[: len(inner), 0] = here
@@ -169,14 +159,9 @@ def spring_numbers(
     straightened = torque / scale
     for at, stiffer in corners:
         straightened = straightened - stiffer * np.maximum(twist - at, 0.0)
+    curve = PchipInterpolator(twist, straightened)
     width = float(twist[-1]) / CELLS
     nodes = width * np.arange(CELLS + 1)
     nodes[-1] = twist[-1]
-    if straight:
-        rate = straightened[-1] / twist[-1]
-        values, rates = rate * nodes, np.full(len(nodes), rate)
-    else:
-        curve = PchipInterpolator(twist, straightened)
-        values, rates = curve(nodes), curve.derivative()(nodes)
-    cells, _ = quartic_cells(width, values, rates)
+    cells, _ = quartic_cells(width, curve(nodes), curve.derivative()(nodes))
     return width, np.concatenate([corners.ravel(), cells.ravel()])

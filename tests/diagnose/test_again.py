@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hdsim.diagnosis.again import _clear, again, as_good, waits
+from hdsim.diagnosis.again import again, as_good
 
 FRICTION, OVER_ANGLE, RIPPLE = "input_coulomb_viscous", "position_dependent_friction", "motor_torque_ripple"
 #: Blocks of time of a model with neither name, what the newest leaves in them alone, and its uncertainty.
@@ -70,17 +70,17 @@ def test_a_fit_without_one_name_that_leaves_more_than_no_name_has_failed(monkeyp
     monkeypatch.setattr("hdsim.diagnosis.again.left_of", left_of)
     added = [SimpleNamespace(effect=name, at_limit=False) for name in (FRICTION, RIPPLE)]
     current = SimpleNamespace(state=SimpleNamespace(added=added), predictions=1.0)
-    names = [SimpleNamespace(name=one.effect, beside=frozenset({"gone"})) for one in added]
+    names = [SimpleNamespace(name=one.effect) for one in added]
     bench = SimpleNamespace(power=lambda predictions: predictions)
     base = SimpleNamespace(predictions=5.0)
     monkeypatch.setattr("hdsim.diagnosis.again._reads", lambda *_: False)
     if failed:
-        assert again(bench, base, current, names, str, ended=True) is current
+        assert again(bench, base, current, names, str, every=True) is current
         assert not asked
         assert [one.name for one in names] == [FRICTION, RIPPLE]
     else:
         with pytest.raises(StopIteration):
-            again(bench, base, current, names, str, ended=True)
+            again(bench, base, current, names, str, every=True)
 
 
 def test_the_only_name_left_is_asked_over_the_base_where_the_fit_without_it_has_failed(monkeypatch):
@@ -101,40 +101,4 @@ def test_the_only_name_left_is_asked_over_the_base_where_the_fit_without_it_has_
     current = SimpleNamespace(state=SimpleNamespace(added=added), predictions=1.0)
     bench = SimpleNamespace(power=lambda predictions: predictions)
     with pytest.raises(AskedError):
-        again(
-            bench,
-            base,
-            current,
-            [SimpleNamespace(name=RIPPLE, beside=frozenset({FRICTION}))],
-            str,
-            ended=True,
-        )
-
-
-def named(name, won, *, sure=0.8, gain=1.0, beside=()):
-    return SimpleNamespace(name=name, won=won, confidence=sure, group={}, gain=gain, beside=frozenset(beside))
-
-
-def test_a_name_waits_where_the_newest_explained_far_less():
-    # All rivals of the first would be fitted anew for each newcomer.
-    first, small, large = named(FRICTION, 100.0), named(RIPPLE, 5.0), named(RIPPLE, 20.0)
-    assert _clear(first, small)
-    assert not _clear(first, large)
-    # Nor does it wait for itself.
-    assert not _clear(small, small)
-
-
-@pytest.mark.parametrize(
-    ("sure", "beside", "others", "asked"),
-    [
-        (0.8, [], [RIPPLE], True),  # it came while that was still missing, and has waited
-        (0.8, [RIPPLE], [RIPPLE], False),  # it was asked beside the same
-        (0.8, [RIPPLE, OVER_ANGLE], [RIPPLE], True),  # beside one that was needless
-        (0.999, [], [RIPPLE], False),  # it had won so clearly that a small one changes nothing
-        (0.999, [RIPPLE], [], True),
-        (0.8, [], [], False),
-    ],
-)
-def test_a_name_is_asked_at_the_end_where_others_have_come_or_gone(sure, beside, others, asked):
-    one = named(FRICTION, 100.0, sure=sure, beside=beside)
-    assert waits(one, [one, *(named(name, 5.0, gain=0.01) for name in others)]) == asked
+        again(bench, base, current, [SimpleNamespace(name=RIPPLE)], str, every=True)

@@ -37,22 +37,6 @@ def closed_form(torsion, twist):
     return np.sign(twist) * torque
 
 
-@pytest.mark.parametrize(
-    "changed",
-    [{}, {"torque_t1_nm": 1e-6}, {"torque_t2_nm": 99.99999}, {"torque_t2_nm": 300.0}, {"torque_t1_nm": 20.0}],
-)
-def test_straight_segments_need_no_table_of_their_wind_up(changed):
-    own = torsion(**changed)
-    corners = [own.torque_t1_nm, own.torque_t2_nm]
-    wind_ups = [lambda torque: spring.catalogue_wind_up(own, torque)]
-    found = []
-    for straight in (False, True):
-        step, numbers = spring.spring_numbers(wind_ups, corners, REACH_NM, straight=straight)
-        twist = np.linspace(-1.2, 1.2, 801) * step * spring.CELLS
-        found.append(np.array([_quartic.spring(numbers, 0, step, spring.CELLS, x, 0.0) for x in twist]))
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-6, atol=1e-8)
-
-
 @pytest.mark.parametrize("scale", [1.0, 1.02])
 def test_torque_and_stiffness_are_exact_beside_a_corner(scale):
     given = torsion()

@@ -56,6 +56,22 @@ def test_a_regression_leaves_the_noise_of_a_plant_that_is_linear_in_its_terms(tm
         assert gap.black_box is None
 
 
+def test_records_with_and_without_a_known_load_are_one_regression(tmp_path):
+    loaded, free = plant(seconds=6), plant(seconds=9)
+    load = 20.0 * np.sin(2 * np.pi * 0.7 * loaded.time)
+    loaded.channels |= {
+        "load_torque": load,
+        "motor_torque": loaded.channels["motor_torque"] - load / 100.0,
+        "output_angle": loaded.channels["output_angle"] + 1e-5 * load,
+    }
+    loaded = Record("loaded", loaded.time, loaded.channels)
+    scenario = model(tmp_path)
+    bench, start = bench_for([loaded, free], [], scenario), state_of(scenario)
+    gap, _ = gaps(bench, dict.fromkeys(("before", "refit", "after"), start))
+    for channel, found in with_baselines(bench, start, gap).items():
+        assert found.regression == pytest.approx(NOISE[channel], rel=0.15)
+
+
 def test_the_noise_beside_a_gap_is_no_bound_where_errors_last(tmp_path):
     def lasting(rng, n):
         """White noise through a first-order lag of 20 samples, standard deviation 0.01."""
