@@ -17,8 +17,12 @@ Array = NDArray[np.float64]
 WHOLE_TICK = 1.05
 #: Longest tick in which a sample that is missing shows at all, in periods of the samples.
 QUICK = 2.0
-#: Most samples of a recording that are looked for as missing.
+#: Ticks from one stamp to the next beyond which a recording paused: it goes on where it goes on.
+PAUSE = 10.0
+#: Most samples between pauses that are looked for as missing.
 MOST_MISSING = 40
+#: Samples that tell whether there is a rate at all.
+ENOUGH = 8000
 #: Rounds in which their rate is found, each with the places of those that were missing at the last one.
 REFINED = 3
 _SECOND_DAY = np.datetime64("1970-01-02", "ns")
@@ -52,8 +56,11 @@ def spread(time: Array, place: str) -> Array:
     if not (steps > 0).any():
         raise InputError(f"{place}: the clock never advances")
     tick = float(np.median(steps[steps > 0]))
-    if (steps == 0).any() and (even := _one_rate(time, tick)) is not None:
-        return even
+    if (steps == 0).any():
+        parts = [_one_rate(part, tick) for part in np.split(time, np.flatnonzero(steps > PAUSE * tick) + 1)]
+        even = [part for part in parts if part is not None]
+        if len(even) == len(parts):
+            return np.concatenate(even)
     missed = steps > 1.5 * tick
     stretches = np.split(time, np.flatnonzero(missed) + 1)
     period = (time[-1] - time[0] - steps[missed].sum()) / max(len(time) - len(stretches), 1)
@@ -66,17 +73,23 @@ def _one_rate(time: Array, tick: float) -> Array | None:
     A clock that is about as quick as the samples shows two at one tick and none at the next, which is no
     sample that is missing: that one leaves all later ones late. The fewest count.
     """
+    if len(time) < 3 or time[-1] == time[0]:
+        return None
     number = np.arange(len(time), dtype=np.float64)
     found = _at_one_rate(time, number, tick)
     span = time[-1] - time[0]
     if found is not None or tick > QUICK * span / (len(time) - 1):
         return found
+    if len(time) > 2 * ENOUGH and _one_rate(time[:ENOUGH], tick) is None:
+        return None  # a clock that is not steady shows it soon
     for missing in range(MOST_MISSING + 1):
         # The stamps at both ends are each a tick late at most.
         for ends in (0.0, -0.5, 0.5):
             rate = (span + ends * tick) / (len(time) - 1 + missing)
             for _ in range(REFINED):
                 number = _counted(time, tick, rate)
+                if number[-1] - len(time) > 2 * MOST_MISSING:
+                    break
                 rate = _rate(time, number, tick)
                 found = _at_one_rate(time, number, tick, rate)
                 if found is not None:

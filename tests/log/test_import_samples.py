@@ -31,12 +31,15 @@ def test_a_constant_rate_is_seen_through_a_coarse_clock_and_a_gap(tmp_path):
         np.testing.assert_allclose(found.time[part], true[part], atol=0.0025)
 
 
+@pytest.mark.parametrize("pause", [False, True])
 @pytest.mark.parametrize("missing", [[], [700, 1500, 1501, 3400]])
-def test_a_clock_as_quick_as_the_samples_shows_some_of_them_twice(tmp_path, missing):
+def test_a_clock_as_quick_as_the_samples_shows_some_of_them_twice(tmp_path, missing, pause):
     # Stamps in whole milliseconds, each sample a hair before or after one: 20, 20, 22, 23, 23, 25 ms ...
     whole = np.arange(2, 4002)
     early = np.random.default_rng(4).random(len(whole)) < 0.4
     true, stamps = (np.delete(values, missing) for values in (whole * 1e-3, (whole - early) * 1e-3))
+    if pause:
+        true[2500:], stamps[2500:] = true[2500:] + 0.7, stamps[2500:] + 0.7
     mapping = BASE.replace("unit: s", "unit: s, quantised: true")
     found = simple(tmp_path, stamps, true, mapping)
     apart = found.time - true
