@@ -109,7 +109,9 @@ def hear_standstill(
             ends = (min(sharp), max(signs)) if better else (max(signs), min(sharp))
             between = _creeping(bench, sharper if better else smooth, ends, under)
             if between is not None:
-                return between
+                creeping, speed = between
+                take([max(speed, own) for own in sharp])
+                return creeping
             if better:
                 take(sharp)
                 return sharper
@@ -120,8 +122,8 @@ def hear_standstill(
 
 def _creeping(
     bench: Bench, best: Fit, ends: tuple[float, float], under: Callable[[float], Fit]
-) -> Fit | None:
-    """The fit under a sign between two, where it explains most of what the better of them leaves.
+) -> tuple[Fit, float] | None:
+    """The fit under a sign between two, and its speed, where it explains most of what the better one leaves.
 
     A shaft may creep a little before it slips. A law of friction that is missing leaves more than that.
 
@@ -147,8 +149,7 @@ def _creeping(
             tried = under(finer * speed)
             if bench.power(tried.predictions) < bench.power(found.predictions):
                 found, speed = tried, finer * speed
-        # The predictors have the last one's.
-        return under(speed)
+        return found, speed
     return None
 
 

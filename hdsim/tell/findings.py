@@ -161,8 +161,9 @@ class Findings:
     def left_most(self) -> tuple[str, str, float]:
         """Training record and channel with the largest residual over its noise, and that ratio; or 0."""
         rest = self.evidence.rest
-        known = rest is not None and math.isfinite(rest.times_noise)
-        return (rest.record, rest.channel, rest.times_noise) if rest and known else ("", "", 0.0)
+        if rest is None or not math.isfinite(rest.times_noise):
+            return "", "", 0.0
+        return rest.record, rest.channel, rest.times_noise
 
 
 def gather(diagnosis: Diagnosis) -> Findings:

@@ -166,7 +166,7 @@ new. Their rates had been seen.
   alternative where it had been named beside. All other names are as they were.
 
 Not run for this page: a search that ends at a third name which held-out data contradict at once, a sign of
-friction between sticking and smooth, clocks of logs. A set of 41 cases by
+friction between sticking and smooth, clocks of logs. A set of 40 cases by
 another author who had read none of these tests found what is behind them: signs smoothed over 0.02 rad/s,
 rows that a bus had dropped, long records with one strong effect. Of eight calibration cases of `numpy` with
 friction (seeds 98 to 138), run with a version between, the names and what they explain were as before, and
