@@ -17,6 +17,7 @@ import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
+from hdsim.diagnosis.effort import MOST_EFFECTS, MOST_STAGES, enough_done, more_could
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.held import hopeless
 from hdsim.diagnosis.late import lines_shown, read_late
@@ -36,8 +37,6 @@ from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import align, reweigh, together, unlikelihood, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 
-#: Most effects that one diagnosis adds, and most passes that it makes.
-MOST_EFFECTS, MOST_STAGES = 4, 7
 #: Part of what a channel lacked at first that a later effect must explain where a smooth curve over the
 #: coordinates of the effects before it would, because no formula is exact.
 WITHIN_GAIN = 0.1
@@ -62,6 +61,7 @@ class Search:
     """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit.
 
     ``better`` is the base without effects where its own numbers explain what the only one was given for.
+    Where it has done enough and not all is explained, it has ``ended``.
     """
 
     fit: Fit
@@ -69,15 +69,19 @@ class Search:
     stages: list[Stage] = field(default_factory=list)
     named: list[Named] = field(default_factory=list)
     better: Fit | None = None
+    ended: bool = False
 
 
-def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Search | None:
+def search(
+    bench: Bench, base: Fit, during: Callable[[str, str], Step], *, thorough: bool = False
+) -> Search | None:
     """Add effects until nothing significant is left.
 
     Args:
         bench: the measured series, weighed.
         base: the re-fitted model.
         during: told the step that begins and what it does; returns who is told the details.
+        thorough: look for further effects whatever it takes (``hdsim.diagnosis.effort``).
 
     Returns:
         None where a vibration at the beginning of a record, or a shaft that sticks, was behind the first
@@ -87,7 +91,7 @@ def search(bench: Bench, base: Fit, during: Callable[[str, str], Step]) -> Searc
     while True:
         if found.named and (hear_swing(bench, found.fit) or hear_rest(bench, last, found.fit)):
             return None
-        following = _next(bench, base, found, during)
+        following = _next(bench, base, found, during, thorough)
         if following is not None:
             last, found.fit = found.fit, following
             follow_teeth(bench, base.state, following.state)
@@ -144,7 +148,9 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
     return found
 
 
-def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Fit | None:
+def _next(
+    bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step], thorough: bool
+) -> Fit | None:
     """The model with one more effect; None when nothing significant is left, or nothing that matters."""
     current = found.fit = read_late(bench, found.fit)
     title = "refit" if not found.named else f"with {found.named[-1].name}"
@@ -159,7 +165,10 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
-    if found.named and not (stage.location.sharp(LEVEL) or _more_could(bench, base, current)):
+    if found.named and not (stage.location.sharp(LEVEL) or more_could(bench, base, current)):
+        return None
+    found.ended = not thorough and enough_done(bench, len(found.stages) - 1)
+    if found.ended:
         return None
     fitted: Fitted = {}
     named = _one_more(bench, base, current, found, stage, bool(found.named), during, fitted)
@@ -339,10 +348,3 @@ def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
         }
         found.append([channel for channel in bench.channels if own[channel] > noise[channel]])
     return found
-
-
-def _more_could(bench: Bench, base: Fit, now: Fit) -> bool:
-    """Whether more than noise is left in some channel, enough for one more effect to matter."""
-    first, last = (bench.channel_powers(each.predictions) for each in (base, now))
-    noise = bench.noise_powers
-    return any(last[c] - noise[c] >= BEYOND_GAIN * (first[c] - noise[c]) for c in first)

@@ -13,6 +13,7 @@ from hdsim.diagnosis.collect import collect
 from hdsim.diagnosis.curve import CurveFit, fit_curve, proved
 from hdsim.diagnosis.decide import Decision, Reason, decide, reasons_of
 from hdsim.diagnosis.discrepancy import discrepancy
+from hdsim.diagnosis.effort import told_of_end
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.growth import tracked
 from hdsim.diagnosis.name import Named
@@ -101,6 +102,7 @@ def diagnose(
     zeros: Zeros = "campaign",
     force: bool = False,
     black_box: bool = False,
+    thorough: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Diagnosis:
     """Find what a model is missing.
@@ -113,6 +115,7 @@ def diagnose(
         zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline.
+        thorough: look for a third effect and more whatever it takes (``hdsim.diagnosis.effort``).
         on_step: called with the name of each step.
 
     Returns:
@@ -126,7 +129,7 @@ def diagnose(
         trees()
     with one_blas_thread():
         tell = on_step or (lambda _: None)
-        return _diagnosed(measured, scenario, holdout, load, zeros, force, black_box, tell)
+        return _diagnosed(measured, scenario, holdout, load, zeros, force, black_box, thorough, tell)
 
 
 def _diagnosed(
@@ -137,6 +140,7 @@ def _diagnosed(
     zeros: Zeros,
     force: bool,
     black_box: bool,
+    thorough: bool,
     tell: Callable[[str], object],
 ) -> Diagnosis:
     """See ``diagnose``."""
@@ -177,7 +181,7 @@ def _diagnosed(
     jumps: list[Jump] = []
     with running:
         while True:
-            found = search(bench, base.fit, during)
+            found = search(bench, base.fit, during, thorough=thorough)
             if found is None:
                 # The first effects have shown samples that do not count.
                 during("refit", "re-fitting the parameters of the model")
@@ -245,6 +249,8 @@ def _diagnosed(
     doubts = suspicions(bench, replace(base, fit=current), start)
     problems += [*doubts, *beginnings(bench), *one_way(bench), *moving_zeros(bench, current.predictions)]
     problems += [*unseen(bench, predictions["after"]), *jumped(bench, jumps), *unsettled(bench, current)]
+    if found.ended:
+        problems.append(told_of_end(bench, len(found.stages) - 1))
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)

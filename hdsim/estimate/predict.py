@@ -134,7 +134,7 @@ class Predictor:
         self._arm = arm if plan.load != "output_torque" else None
         self.course = None if self._arm is None else arm_course(record, self._arm)
         self.ratio = ratio
-        self.runs = 0
+        self.steps: list[int] = []  # of the integration, of each prediction
         #: Of drives with teeth (``hdsim.estimate.short_cut``): no short cut; whose teeth are in a table.
         self.whole = False
         self.table_for: frozenset[str] | None = None
@@ -302,11 +302,11 @@ class Predictor:
             raise PredictionError(str(error)) from None
         for side in {"ring", "output"} & set(model.place_of):
             model.system.y0[model.place_of[side]] = self._zero
-        self.runs += 1
-        asked = dict.fromkeys((*self.plan.channels, *also))
+        asked = tuple(dict.fromkeys((*self.plan.channels, *also)))
         try:
-            atol = self.rtol * model.seen_scale(CLOSER if self.whole else 1.0)
-            got = sample(model, self.record.time + LEAD_IN_S, tuple(asked), rtol=self.rtol, atol=atol)
+            rtol, scale = self.rtol, model.seen_scale(CLOSER if self.whole else 1.0)
+            times = self.record.time + LEAD_IN_S
+            got = sample(model, times, asked, rtol=rtol, atol=rtol * scale, steps=self.steps)
         except RunFailed as error:
             raise PredictionError(str(error)) from None
         found = {c: self._means.of(got.get(f"measured_{c}", got[c])) for c in self.plan.channels}

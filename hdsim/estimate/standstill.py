@@ -22,14 +22,15 @@ import numpy as np
 from hdsim.drive.parameters import RESOLVED_RAD_PER_S, STICKS_RAD_PER_S
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
+from hdsim.estimate.fit import Fit, at_present
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import FEWEST_SAMPLES, Array, Mask
 from hdsim.estimate.series import Counted
 from hdsim.estimate.state import State
+from hdsim.estimate.vector import Vector, sensitivities
 from hdsim.log.outliers import runs_of
 
 if TYPE_CHECKING:
-    from hdsim.estimate.fit import Fit
     from hdsim.estimate.predict import Predictor
 
 #: Standard deviations of a speed beyond which its sign is certain (95 %).
@@ -41,7 +42,7 @@ SMOOTHED = float(np.sqrt(np.pi / 2.0))
 #: Samples on either side that count with one of unknown sign: where friction's jump can be seen, the motion's
 #: spline has knots that many samples apart, and smooths the jump in acceleration over them.
 BESIDE = 4
-#: Factor between smoothing speeds of a sign that are tried.
+#: At most the square of the factor between smoothing speeds of a sign that are tried.
 CREEPS = 3.0
 #: Log-likelihood by which the sharper sign must be the better one: "very strong" (Kass and Raftery 1995).
 CLEARLY = 5.0
@@ -102,16 +103,13 @@ def hear_standstill(
             sharper = end_of(anew())
             better = _likelier(bench, smooth.predictions, sharper.predictions)
 
-            def under(speed: float) -> Fit:
+            def sign(speed: float) -> None:
                 take([max(speed, own) for own in sharp])
-                return end_of(anew())
 
             ends = (min(sharp), max(signs)) if better else (max(signs), min(sharp))
-            between = _creeping(bench, sharper if better else smooth, ends, under)
+            between = _creeping(bench, sharper if better else smooth, ends, sign, lambda: end_of(anew()))
             if between is not None:
-                creeping, speed = between
-                take([max(speed, own) for own in sharp])
-                return creeping
+                return between
             if better:
                 take(sharp)
                 return sharper
@@ -121,9 +119,13 @@ def hear_standstill(
 
 
 def _creeping(
-    bench: Bench, best: Fit, ends: tuple[float, float], under: Callable[[float], Fit]
-) -> tuple[Fit, float] | None:
-    """The fit under a sign between two, and its speed, where it explains most of what the better one leaves.
+    bench: Bench,
+    best: Fit,
+    ends: tuple[float, float],
+    sign: Callable[[float], None],
+    anew: Callable[[], Fit],
+) -> Fit | None:
+    """The fit under a sign between two, where it explains most of what the better one leaves.
 
     A shaft may creep a little before it slips. A law of friction that is missing leaves more than that.
 
@@ -131,25 +133,35 @@ def _creeping(
         bench: the measured series, weighed.
         best: the fit under the better sign.
         ends: smoothing speeds of that sign and of the other one, rad/s.
-        under: makes a fit under a sign of a smoothing speed.
+        sign: takes the sign of a smoothing speed.
+        anew: makes a fit under the sign that is taken.
     """
-    speed, other = ends
-    step = CREEPS if other > speed else 1.0 / CREEPS
     noise, first = bench.noise_power, bench.power(best.predictions)
-    found = best
+    if first <= noise:
+        return None
+    enough = noise + 0.5 * (first - noise)
+    sign(ends[0])
+    vector = Vector(best.state, tuple(at_present(best)), len(best.state.added))
+    columns = sensitivities(bench, vector, vector.start(), best.predictions)
+    columns = np.hstack([columns, bench.offset_columns()])
+
+    def left(speed: float) -> float:
+        """What is left of the power under a sign once the numbers have made up for it, as far as they can."""
+        sign(speed)
+        rest = bench.stacked(bench.residuals(bench.predict(best.state)))
+        moves, *_ = np.linalg.lstsq(columns, rest, rcond=1e-6)
+        return float(np.sum((rest - columns @ moves) ** 2))
+
     with contextlib.suppress(PredictionError):
-        while abs(math.log(other / speed)) > math.log(CREEPS):
-            tried = under(step * speed)
-            if not _likelier(bench, found.predictions, tried.predictions):
-                break
-            found, speed = tried, step * speed
-        if found is best or bench.power(found.predictions) - noise > 0.5 * (first - noise):
+        count = math.ceil(abs(math.log(ends[1] / ends[0])) / math.log(CREEPS))
+        tried = {speed: left(speed) for speed in np.geomspace(*ends, 2 * count + 1)[1:-1].tolist()}
+        speed = min(tried, key=tried.__getitem__, default=0.0)
+        if not tried or tried[speed] > enough:
             return None
-        for finer in (step**0.5, step**-0.5, step**0.25, step**-0.25):
-            tried = under(finer * speed)
-            if bench.power(tried.predictions) < bench.power(found.predictions):
-                found, speed = tried, finer * speed
-        return found, speed
+        sign(min((speed * CREEPS**finer for finer in (-0.25, 0.0, 0.25)), key=left))
+        found = anew()
+        if _likelier(bench, best.predictions, found.predictions) and bench.power(found.predictions) < enough:
+            return found
     return None
 
 

@@ -43,6 +43,7 @@ def diagnose(
     zeros: Zeros = "campaign",
     force: bool = False,
     black_box: bool = False,
+    thorough: bool = False,
     out: str | Path | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Diagnosis:
@@ -61,6 +62,7 @@ def diagnose(
         zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline (``hdsim[baseline]``).
+        thorough: look for a third effect and more however long that takes.
         out: folder for the report, the log and the scenario with the result (``verdict.scenario``);
             needs the scenario's file.
         on_step: called with the name of each step.
@@ -77,7 +79,7 @@ def diagnose(
     records, held = _records(measured, mapping), _records(holdout, mapping)
     found = run(
         records, loaded(scenario), holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
-        on_step=on_step,
+        thorough=thorough, on_step=on_step,
     )  # fmt: skip
     if base is not None and out is not None:
         from hdsim.tell.save import save

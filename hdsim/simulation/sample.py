@@ -35,6 +35,7 @@ def sample(
     *,
     rtol: float = 1e-6,
     atol: float | Array | None = None,
+    steps: list[int] | None = None,
 ) -> dict[str, Array]:
     """Run a model from rest at time 0 to the last of the times.
 
@@ -44,6 +45,7 @@ def sample(
         channels: names in ``Observer.formulas``, or of states that parts add.
         rtol: relative tolerance.
         atol: absolute tolerance of the states in their units; rtol times each state's scale when None.
+        steps: gets the number of steps that the integration has taken, rejected ones included.
 
     Returns:
         The channels, shape (m,) each; beside those with a sensor what it reads, as ``measured_...``.
@@ -52,7 +54,7 @@ def sample(
         InputError: there is no such channel.
         RunFailed: the integration stopped before the end; the message says why.
     """
-    return samples_beside(model, (), times, channels, rtol=rtol, atol=atol)[0]
+    return samples_beside(model, (), times, channels, rtol=rtol, atol=atol, steps=steps)[0]
 
 
 def samples_beside(
@@ -63,6 +65,7 @@ def samples_beside(
     *,
     rtol: float = 1e-6,
     atol: float | Array | None = None,
+    steps: list[int] | None = None,
 ) -> list[dict[str, Array]]:
     """Run a model, and others that differ so little from it that they may be linearised beside it.
 
@@ -76,6 +79,7 @@ def samples_beside(
         channels: likewise.
         rtol: likewise.
         atol: likewise.
+        steps: likewise.
 
     Returns:
         What ``sample`` returns, of the model and of each other one.
@@ -110,6 +114,8 @@ def samples_beside(
         guard=speed_guard(model),
         others=beside,
     )
+    if steps is not None and found.statistics is not None:
+        steps.append(found.statistics.steps + found.statistics.rejected)
     if not found.success:
         raise RunFailed(told(model, found))
     # What jumps at a time has jumped already.

@@ -12,6 +12,7 @@ from hdsim.tell.commands_shared import measured_options, opened
 
 @click.command()
 @measured_options
+@click.option("--thorough", is_flag=True, help="Look for a third effect and more, however long that takes.")
 def diagnose(
     measured: tuple[Path, ...],
     model: Path,
@@ -22,6 +23,7 @@ def diagnose(
     zeros: Any,
     force: bool,
     black_box: bool,
+    thorough: bool,
 ) -> int:
     """Find which physical effect a model is missing.
 
@@ -37,7 +39,7 @@ def diagnose(
     with Progress() as tell:
         found = run(
             records, scenario, holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
-            on_step=tell,
+            thorough=thorough, on_step=tell,
         )  # fmt: skip
         tell("finding the next experiment, writing the report")
         told = gather(found)
