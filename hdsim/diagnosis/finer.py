@@ -165,7 +165,8 @@ def _at_their_ends(bench: Bench, ways: Sequence[tuple[Fit, list[Added]]]) -> lis
     """All numbers fitted with these effects, from where each way begins, as far as that leads.
 
     Those that leave least are carried on, fewer each time (successive halving: Jamieson and Talwalkar 2016,
-    AISTATS 51:240): most of several starts are seen early to end in the same place or in a worse one.
+    AISTATS 51:240): most of several starts are seen early to end in the same place or in a worse one. What
+    has fallen by less than an independent sample of what it leaves is worth has come to its end.
 
     Args:
         bench: the measured series.
@@ -182,8 +183,11 @@ def _at_their_ends(bench: Bench, ways: Sequence[tuple[Fit, list[Added]]]) -> lis
         lower: dict[int, float] = {}
         for k in on:
             further = _fitted(bench, ends[k], list(ends[k].state.added))
-            if further is not None and (power := bench.power(further.predictions)) < left[k]:
-                ends[k], lower[k] = further, power
+            if further is None or (power := bench.power(further.predictions)) >= left[k]:
+                continue
+            ends[k] = further
+            if left[k] - power > bench.sample_power(bench.stacked(bench.residuals(further.predictions))):
+                lower[k] = power
         left = lower
     return ends
 

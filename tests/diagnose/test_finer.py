@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from diagnose_bench import beyond, servo_with_arm, with_effects
 from noisy import noisy
@@ -132,3 +134,21 @@ def test_a_play_beside_another_effect_is_refined_though_it_is_not_the_newest() -
     assert [one.effect for one in found.state.added] == [PLAY, other]
     assert [one.fitting.label for one in found.state.added] == ["of many teeth", ""]
     assert beyond(bench, found) < 0.1 < 1.0 < beyond(bench, plain)
+
+
+@pytest.mark.parametrize(("falls", "fits"), [((5.0, 5.0), 3), ((0.5, 5.0), 2)])
+def test_a_fit_that_has_come_to_its_end_is_not_carried_on_again(falls, fits, monkeypatch):
+    """An independent sample of what is left is worth 1 here."""
+    powers = iter(100.0 - np.cumsum([0.0, *falls]))
+    made = []
+
+    def fitted(*args, **options):
+        made.append(SimpleNamespace(predictions=next(powers), state=SimpleNamespace(added=())))
+        return made[-1]
+
+    monkeypatch.setattr(finer, "_fitted", fitted)
+    bench = SimpleNamespace(
+        power=lambda left: left, residuals=lambda _: [], stacked=lambda _: [], sample_power=lambda _: 1.0
+    )
+    assert finer._at_their_ends(bench, [(None, [])]) == [made[-1]]
+    assert len(made) == fits
