@@ -134,7 +134,7 @@ class Predictor:
         self._arm = arm if plan.load != "output_torque" else None
         self.course = None if self._arm is None else arm_course(record, self._arm)
         self.ratio = ratio
-        self.steps: list[int] = []  # of the integration, of each prediction
+        self.steps: list[int] = []  # of the integration, of each prediction but of whole models
         #: Of drives with teeth (``hdsim.estimate.short_cut``): no short cut; whose teeth are in a table.
         self.whole = False
         self.table_for: frozenset[str] | None = None
@@ -305,8 +305,8 @@ class Predictor:
         asked = tuple(dict.fromkeys((*self.plan.channels, *also)))
         try:
             rtol, scale = self.rtol, model.seen_scale(CLOSER if self.whole else 1.0)
-            times = self.record.time + LEAD_IN_S
-            got = sample(model, times, asked, rtol=rtol, atol=rtol * scale, steps=self.steps)
+            times, steps = self.record.time + LEAD_IN_S, [] if self.whole else self.steps
+            got = sample(model, times, asked, rtol=rtol, atol=rtol * scale, steps=steps)
         except RunFailed as error:
             raise PredictionError(str(error)) from None
         found = {c: self._means.of(got.get(f"measured_{c}", got[c])) for c in self.plan.channels}

@@ -101,9 +101,15 @@ class _Block:
         )
 
     def cover(
-        self, cuts: Array, inside_at: int, guard: Guard | None, t_eval: Array, others: Beside
+        self,
+        cuts: Array,
+        inside_at: int,
+        guard: Guard | None,
+        t_eval: Array,
+        others: Beside,
+        most_steps: float,
     ) -> tuple[int, Array, int, Array]:
-        """Integrate through all spans; see ``_cover.cover``.
+        """Integrate through all spans, or until so many steps are taken; see ``_cover.cover``.
 
         Returns status, samples (m, n), their number, and differences of the others' samples (k, m, n).
         """
@@ -113,7 +119,8 @@ class _Block:
         slopes, sizes = np.zeros_like(near), np.abs(near)
         progress = np.zeros(2, dtype=np.int64)
         status = compiled.RUNNING
-        while status == compiled.RUNNING:
+        tried = slice(compiled.ACCEPTED, compiled.REJECTED + 1)
+        while status == compiled.RUNNING and self.counts[tried].sum() <= most_steps:
             status = _cover.cover(
                 *self._kernel,
                 self.y,
@@ -276,6 +283,7 @@ def rodas4_through(
     first_step: float | None = None,
     max_step: float = np.inf,
     others: Beside | None = None,
+    most_steps: float = np.inf,
 ) -> Integration:
     """Integrate forward through smooth spans in one compiled loop, without SciPy's.
 
@@ -295,6 +303,7 @@ def rodas4_through(
         first_step: size of the first step; chosen when None.
         max_step: largest step.
         others: models beside this one, alike in all but numbers and without quadratures.
+        most_steps: the run is given up at the end of the blocks in which it has tried more.
 
     Returns:
         Samples (n, m) up to where it came, and why it stopped. ``message`` has no hint at the cause.
@@ -309,10 +318,12 @@ def rodas4_through(
         reals, none = np.zeros((0, len(system.reals))), np.zeros((0, system.size))
         others = Beside(reals, none, lists, np.zeros(0, dtype=np.bool_))
     block = _Block(system, float(cuts[0]), y0, float(cuts[1]), rtol, atol, first_step, max_step, 64, stops)
-    status, samples, count, beside = block.cover(cuts, inside_at, guard, t_eval, others)
+    status, samples, count, beside = block.cover(cuts, inside_at, guard, t_eval, others, most_steps)
     t = float(block.control[compiled.T])
     error = guard.error() if status == _cover.RUNAWAY and guard is not None else None
     cause = f"RunawayError: {error}." if error is not None else _CAUSES.get(status, "")
+    if status == compiled.RUNNING:
+        cause = f"More than {most_steps:.6g} steps."
     suspect = int(block.counts[compiled.SUSPECT]) if status in _NAMES_SUSPECT else -1
     return Integration(
         t=t_eval[:count],

@@ -8,6 +8,7 @@ from hdsim.drive.model import Model
 from hdsim.errors import InputError
 from hdsim.estimate.spline import signal, smoothed
 from hdsim.scenario import Scenario
+from hdsim.simulation import rosenbrock
 from hdsim.simulation.run import Run, RunFailed
 from hdsim.simulation.sample import sample
 
@@ -162,3 +163,17 @@ def test_a_load_that_runs_away_behind_a_prescribed_motor_is_given_up_before_its_
     # The motor's limit of 1e5 rad/s, behind a ratio of 100.
     with pytest.raises(RunFailed, match=r"output less ideal velocity \(rad/s\) exceeds 1000\b"):
         sample(model_of(effects, audited=False), np.arange(0.0, DURATION, 1 / RATE), CHANNELS, rtol=3e-5)
+
+
+def test_a_run_that_takes_far_more_steps_than_those_like_it_is_given_up(monkeypatch):
+    monkeypatch.setattr(rosenbrock, "_BLOCKS", 1)  # blocks of 64 steps between two looks
+    model, times = model_of({}), np.arange(0.0, DURATION, 1 / RATE)
+    steps = []
+    for _ in range(2):
+        sample(model_of({}), times, CHANNELS, steps=steps)
+    assert steps[0] == steps[1] > 200
+    with pytest.raises(RunFailed, match="More than 100 steps"):
+        sample(model, times, CHANNELS, steps=(few := [1]))
+    assert 100 < few[1] <= 100 + 64 + 1
+    with pytest.raises(RunFailed, match="More than 100 steps"):
+        sample(model, times, CHANNELS, steps=few)  # the first counts, not the last
