@@ -9,7 +9,8 @@ from running import attempt, stored, task_of
 #: Short logs of every kind.
 SAMPLE = (
     pytest.param("numpy/parameter/-/3/0", marks=pytest.mark.study),
-    "numpy/effect/-/34/50",
+    "numpy/effect/-/31/98",
+    pytest.param("numpy/effect/-/34/50", marks=pytest.mark.study),
     pytest.param("numpy/null/-/7/0", marks=pytest.mark.study),
 )
 

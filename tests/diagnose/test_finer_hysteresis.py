@@ -103,6 +103,7 @@ def test_sliders_that_no_plain_formula_has_are_found_whichever_was_named(named: 
 
 
 @pytest.mark.slow
+@pytest.mark.study
 def test_a_name_gives_way_to_a_look_alike_that_explains_the_rest() -> None:
     """Of the plain formulas the exponential branch comes nearest."""
     record = noisy(hdsim.simulate(scenario({MAXWELL: growing(4.0, 0.8)})), NOISE, seed=0)

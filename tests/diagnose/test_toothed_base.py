@@ -173,7 +173,9 @@ def test_a_tooth_is_found_in_a_drive_whose_arc_of_teeth_is_another() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("amplitude_deg", "told"), [(120.0, True), (2600.0, False)])
+@pytest.mark.parametrize(
+    ("amplitude_deg", "told"), [(120.0, True), pytest.param(2600.0, False, marks=pytest.mark.study)]
+)
 def test_a_record_of_few_turns_does_not_tell_the_splines_apart(amplitude_deg: float, told: bool) -> None:
     hidden = {"tooth_error": {"member": "flexspline", "tooth": 57.0, "shift_um": 12.0}}
     bench, base = bench_of(hidden, amplitude_deg=amplitude_deg)

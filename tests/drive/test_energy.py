@@ -144,9 +144,18 @@ def test_with_losses_the_audit_closes() -> None:
     assert np.all(np.diff(recording["heat"]) >= -1e-9)
 
 
-@pytest.mark.parametrize("mesh", [{"model": "lumped"}, {"model": "teeth"}], ids=["lumped", "teeth"])
-@pytest.mark.parametrize("arrangement", ["circular_spline_fixed", "flexspline_fixed"])
-def test_friction_grows_with_all_that_the_teeth_carry(mesh: dict[str, Any], arrangement: str) -> None:
+@pytest.mark.parametrize(
+    ("model", "arrangement", "seconds", "rtol"),
+    [
+        ("lumped", "circular_spline_fixed", 4.0, 1e-9),
+        ("lumped", "flexspline_fixed", 4.0, 1e-9),
+        ("teeth", "circular_spline_fixed", 2.0, 1e-7),
+        ("teeth", "flexspline_fixed", 2.0, 1e-7),
+    ],
+)
+def test_friction_grows_with_all_that_the_teeth_carry(
+    model: str, arrangement: str, seconds: float, rtol: float
+) -> None:
     """T_f = (T_c + c_L |tau / i|) sign(w_m), tau with the hysteresis: no damper."""
     found = build_run(
         Scenario.model_validate(
@@ -154,7 +163,7 @@ def test_friction_grows_with_all_that_the_teeth_carry(mesh: dict[str, Any], arra
                 "drive": {
                     "preset": "seed-2021",
                     "arrangement": arrangement,
-                    "mesh": mesh,
+                    "mesh": {"model": model},
                     "torsion": {"damping_nm_s_per_rad": 0.0},
                     "friction": {
                         "coulomb_nm": 0.05,
@@ -172,7 +181,7 @@ def test_friction_grows_with_all_that_the_teeth_carry(mesh: dict[str, Any], arra
                     "output": {"type": "locked"},
                 },
                 "load": {"inertia_kg_m2": 0.5},
-                "run": {"duration_s": 4.0, "sample_rate_hz": 200, "rtol": 1e-9},
+                "run": {"duration_s": seconds, "sample_rate_hz": 200, "rtol": rtol},
             }
         )
     ).record()

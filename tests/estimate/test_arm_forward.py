@@ -43,6 +43,7 @@ def test_the_motors_torque_is_what_inverse_dynamics_ask_of_the_simulated_motion(
 
 
 @pytest.mark.slow
+@pytest.mark.study
 def test_a_ripple_of_one_joint_is_named_beside_five_others_that_move():
     run = forward.run(1, forward.Hidden(ripple_nm=0.02, ripple_order=6.0, phase=1.0), 5.0, 3)
     rng = np.random.default_rng(0)

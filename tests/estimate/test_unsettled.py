@@ -49,6 +49,7 @@ def problems_of(play_arcmin: float, load_kg_m2: float, seed: int) -> list[Proble
 
 
 @pytest.mark.slow
+@pytest.mark.study
 def test_a_fit_that_a_free_load_has_stopped_is_said():
     # Where it stops is chance: six of eight are said.
     said = [problems_of(0.5, *begin) for begin in ((3.3, 1), (3.3, 2), (3.45, 2), (2.7, 1))]
