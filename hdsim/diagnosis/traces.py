@@ -187,10 +187,10 @@ def screen(
         if one is not first and kindred:
             first.others.append(one)
     for name in catalogue():
-        if name not in best:
-            found.skipped.setdefault(
-                name, "no effect on these channels, or a channel that it needs is missing"
-            )
+        if name in best:
+            found.skipped.pop(name, None)  # one of its ways has been tried
+            continue
+        found.skipped.setdefault(name, "no effect on these channels, or a channel that it needs is missing")
     found.ranked += best.values()
     _remarkable_first(found, shares)
     return found

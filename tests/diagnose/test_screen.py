@@ -1,6 +1,15 @@
 import numpy as np
+from diagnose_bench import servo_with_arm
+from noisy import noisy
 
+import hdsim
+from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.screen import Residual, chance_of
+from hdsim.diagnosis.traces import screen
+from hdsim.effects import catalogue
+from hdsim.estimate.opening import bench_for
+from hdsim.estimate.refit import refit
+from hdsim.estimate.state import state_of
 
 N, BLOCKS = 4000, 40
 
@@ -57,3 +66,16 @@ def test_freedom_without_meaning_has_a_negative_share():
     noise = np.random.default_rng(9).standard_normal((N, 30))
     residual = Residual(coloured(8), np.ones((N, 1)), blocks())
     assert residual.share(noise).share < 0.005
+
+
+def test_an_effect_of_which_one_way_was_tried_is_not_among_those_that_were_not():
+    """Seven turns of the wave generator are too few for a sensor's ripple, not for its delay."""
+    base = servo_with_arm({"model": "lumped"}, {}, frequency_hz=0.1, duration_s=1.5)
+    noise = {"motor_angle": 2e-5, "output_angle": 2e-6, "motor_torque": 6e-3}
+    bench = bench_for([noisy(hdsim.simulate(base), noise, seed=0)], [], base)
+    found = refit(bench, state_of(base)).fit
+    screening = screen(bench, found.state, left_of(bench, found), [])
+    tried = {one.name for one in screening.ranked}
+    assert "sensors" in tried
+    assert tried.isdisjoint(screening.skipped)
+    assert tried | set(screening.skipped) == set(catalogue())
