@@ -156,7 +156,8 @@ def _creeping(
         count = math.ceil(abs(math.log(ends[1] / ends[0])) / math.log(CREEPS))
         tried = {speed: left(speed) for speed in np.geomspace(*ends, 2 * count + 1)[1:-1].tolist()}
         speed = min(tried, key=tried.__getitem__, default=0.0)
-        if not tried or tried[speed] > enough:
+        # The numbers may go on from there.
+        if not tried or tried[speed] > noise + 0.9 * (first - noise):
             return None
         sign(min((speed * CREEPS**finer for finer in (-0.25, 0.0, 0.25)), key=left))
         found = anew()
