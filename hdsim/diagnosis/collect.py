@@ -15,8 +15,8 @@ from hdsim.diagnosis.evidence import (
     RestEvidence,
     StageEvidence,
 )
-from hdsim.diagnosis.held import held_of, own_held
-from hdsim.diagnosis.locate import SHARP, Location
+from hdsim.diagnosis.held import held_of, law_of, own_held
+from hdsim.diagnosis.locate import Location
 from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.search import Search, Stage, shown_in
 from hdsim.effects import catalogue
@@ -124,21 +124,13 @@ def _law(
     held: HeldOutEvidence | None,
 ) -> LawEvidence:
     own = max(_own(added, channels, last), 0.0)
-    return LawEvidence(
-        name=one.name,
-        group=list(one.group),
-        chance=one.chance,
-        sampled=one.confidence,
-        gain=one.gain,
-        # Sharp lines are no part of what smooth effects have left.
-        needed=max(one.needed, one.of_lines) if added.lives_in[0] == SHARP else one.needed,
-        own_left=own / max(own + max(worth, 0.0), 1e-300),
-        own_first=_own_first(added, channels, last),
-        exact=catalogue()[one.name].signature.exact,
-        at_limit=added.at_limit,
-        sharp=added.lives_in[0] == SHARP,
-        held=held,
-    )
+    of_the_last = {
+        "group": list(one.group),
+        "own_left": own / max(own + max(worth, 0.0), 1e-300),
+        "own_first": _own_first(added, channels, last),
+        "at_limit": added.at_limit,
+    }
+    return law_of(one, added, one.needed, held).model_copy(update=of_the_last)
 
 
 def _own_first(added: Added, channels: Sequence[str], location: Location) -> bool:

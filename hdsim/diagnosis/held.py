@@ -16,6 +16,7 @@ from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import borne_out
 from hdsim.estimate.records import Array
+from hdsim.estimate.state import Added
 from hdsim.estimate.unwound import turned_to_zero
 
 #: Probability of a third or later name below which the search does not go on with it (chosen: a tenth of
@@ -75,17 +76,28 @@ def hopeless(bench: Bench, current: Fit, newest: Named) -> bool:
         return False
     if rest is None or held is None:
         return False
-    added = current.state.added[-1]
+    law = law_of(newest, current.state.added[-1], needed(bench, rest, current), held)
+    return probability(Evidence(laws=[law, law], explained=1.0), 1, RULES, []) < HOPELESS
+
+
+def law_of(named: Named, added: Added, part: float, held: HeldOutEvidence | None) -> LawEvidence:
+    """The evidence for a name beside others, but for what the last residual says of it.
+
+    Args:
+        named: the name.
+        added: its effect.
+        part: of what would be missing without it, that which it explains.
+        held: what held-out data say of it.
+    """
     sharp = added.lives_in[0] == SHARP
-    part = needed(bench, rest, current)
-    law = LawEvidence(
-        name=newest.name,
-        chance=newest.chance,
-        sampled=newest.confidence,
-        gain=newest.gain,
-        needed=max(part, newest.of_lines) if sharp else part,
-        exact=catalogue()[newest.name].signature.exact,
+    return LawEvidence(
+        name=named.name,
+        chance=named.chance,
+        sampled=named.confidence,
+        gain=named.gain,
+        # Sharp lines are no part of what smooth effects have left.
+        needed=max(part, named.of_lines) if sharp else part,
+        exact=catalogue()[named.name].signature.exact,
         sharp=sharp,
         held=held,
     )
-    return probability(Evidence(laws=[law, law], explained=1.0), 1, RULES, []) < HOPELESS
