@@ -160,15 +160,15 @@ def _next(
     location = locate(bench, found.left, residuals, current.state.delays)
     stage = Stage(title, location, found.left.power)
     found.stages.append(stage)
+    found.ended = False
     if nothing_but_flanks(bench, stage.power, found.left.project):
         return None
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
-    if found.named and not (stage.location.sharp(LEVEL) or more_could(bench, base, current)):
-        return None
-    found.ended = not thorough and enough_done(bench, len(found.stages) - 1)
-    if found.ended:
+    more = not found.named or stage.location.sharp(LEVEL) or more_could(bench, base, current)
+    found.ended = more and not thorough and enough_done(bench, len(found.stages) - 1)
+    if found.ended or not more:
         return None
     fitted: Fitted = {}
     named = _one_more(bench, base, current, found, stage, bool(found.named), during, fitted)

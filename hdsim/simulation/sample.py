@@ -50,8 +50,8 @@ def sample(
         channels: names in ``Observer.formulas``, or of states that parts add.
         rtol: relative tolerance.
         atol: absolute tolerance of the states in their units; rtol times each state's scale when None.
-        steps: of runs alike, in which a run that takes ``FAR_MORE`` times those of the first fails; gets the
-            number that this one has taken, rejected ones included.
+        steps: of runs alike. One that takes ``FAR_MORE`` times those of the first (or one a sample, where
+            that is more) fails. Gets the number that this one has taken, rejected ones included.
 
     Returns:
         The channels, shape (m,) each; beside those with a sensor what it reads, as ``measured_...``.
@@ -119,7 +119,7 @@ def samples_beside(
         inside_at=layout.INSIDE,
         guard=speed_guard(model),
         others=beside,
-        most_steps=FAR_MORE * steps[0] if steps else np.inf,
+        most_steps=FAR_MORE * max(steps[0], len(grid)) if steps else np.inf,
     )
     if steps is not None and found.statistics is not None:
         steps.append(found.statistics.steps + found.statistics.rejected)

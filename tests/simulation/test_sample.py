@@ -167,13 +167,14 @@ def test_a_load_that_runs_away_behind_a_prescribed_motor_is_given_up_before_its_
 
 def test_a_run_that_takes_far_more_steps_than_those_like_it_is_given_up(monkeypatch):
     monkeypatch.setattr(rosenbrock, "_BLOCKS", 1)  # blocks of 64 steps between two looks
-    model, times = model_of({}), np.arange(0.0, DURATION, 1 / RATE)
-    steps = []
+    times, steps = np.arange(0.0, DURATION, 1 / RATE), []
     for _ in range(2):
         sample(model_of({}), times, CHANNELS, steps=steps)
-    assert steps[0] == steps[1] > 200
-    with pytest.raises(RunFailed, match="More than 100 steps"):
-        sample(model, times, CHANNELS, steps=(few := [1]))
-    assert 100 < few[1] <= 100 + 64 + 1
-    with pytest.raises(RunFailed, match="More than 100 steps"):
-        sample(model, times, CHANNELS, steps=few)  # the first counts, not the last
+    assert steps[0] == steps[1] > 1000
+    monkeypatch.setattr("hdsim.simulation.sample.FAR_MORE", 0.2)
+    # The first counts, not the last; one step a sample where that is more, as of a model without a state.
+    for first, most in ((2000, 400), (0, 200)):
+        alike = [first, 10**6]
+        with pytest.raises(RunFailed, match=f"More than {most} steps"):
+            sample(model_of({}), times, CHANNELS, steps=alike)
+        assert most < alike[-1] <= most + 64 + 1
