@@ -136,7 +136,7 @@ def test_a_re_fit_that_fails_once_all_begins_anew_is_told(tmp_path, monkeypatch)
         return fitted[0]
 
     monkeypatch.setattr(workflow, "refit", fails_at_last)
-    monkeypatch.setattr(workflow, "search", lambda *_: None)
+    monkeypatch.setattr(workflow, "search", lambda *_, **options: None)
     with pytest.raises(InputError, match="r: the model cannot follow the measured motion: it ran away"):
         workflow.diagnose([scaled()], scenario(tmp_path))
 
