@@ -42,7 +42,7 @@ SMOOTHED = float(np.sqrt(np.pi / 2.0))
 #: Samples on either side that count with one of unknown sign: where friction's jump can be seen, the motion's
 #: spline has knots that many samples apart, and smooths the jump in acceleration over them.
 BESIDE = 4
-#: At most the square of the factor between smoothing speeds of a sign that are tried.
+#: Smoothing speeds of a sign that are tried are apart by the square root of this factor, or less.
 CREEPS = 3.0
 #: Log-likelihood by which the sharper sign must be the better one: "very strong" (Kass and Raftery 1995).
 CLEARLY = 5.0
@@ -159,7 +159,8 @@ def _creeping(
         # The numbers may go on from there.
         if not tried or tried[speed] > noise + 0.9 * (first - noise):
             return None
-        sign(min((speed * CREEPS**finer for finer in (-0.25, 0.0, 0.25)), key=left))
+        tried |= {near: left(near) for near in (speed * CREEPS**-0.25, speed * CREEPS**0.25)}
+        sign(min(tried, key=tried.__getitem__))
         found = anew()
         if _likelier(bench, best.predictions, found.predictions) and bench.power(found.predictions) < enough:
             return found
