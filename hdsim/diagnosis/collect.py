@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hdsim.diagnosis.beyond import shown_in
 from hdsim.diagnosis.decide import WORSE
 from hdsim.diagnosis.evidence import (
     Evidence,
@@ -18,7 +19,7 @@ from hdsim.diagnosis.evidence import (
 from hdsim.diagnosis.held import held_of, law_of, own_held
 from hdsim.diagnosis.locate import Location
 from hdsim.diagnosis.name import Named
-from hdsim.diagnosis.search import Search, Stage, shown_in
+from hdsim.diagnosis.search import Search, Stage
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.flanks import nothing_but_flanks, only_flanks

@@ -78,7 +78,11 @@ def refined(
     best = min(inside, key=cost, default=plain)
     missing, left = (bench.power(each.predictions) - noise for each in (base, plain))
     matters = min(BEYOND_GAIN * missing, max(NEWS * left, EXCESS * noise))
-    return sharpened(bench, best) if cost(plain) - cost(best) > matters else current
+    if cost(plain) - cost(best) > matters:
+        return sharpened(bench, best)
+    # Nor may the one that is taken be short of its end where the plain one has come on.
+    came_on = cost(current) - cost(plain) > NEWS * (bench.power(current.predictions) - noise)
+    return sharpened(bench, plain) if came_on else current
 
 
 def _in_finer(bench: Bench, current: Fit, begins: Sequence[Added]) -> list[Fit]:
@@ -97,12 +101,16 @@ def _in_finer(bench: Bench, current: Fit, begins: Sequence[Added]) -> list[Fit]:
     return inside
 
 
-def each_refined(bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object]) -> Fit:
-    """The model with each of its effects in a finer formula, as ``refined`` has its newest."""
+def each_refined(
+    bench: Bench, base: Fit, current: Fit, tell: Callable[[str], object], worth: Sequence[bool]
+) -> Fit:
+    """The model with each effect that is ``worth`` it in a finer formula, as ``refined`` has its newest."""
     count = len(current.state.added)
-    for _ in range(count):
+    for k in range(count):
         # Each in turn is the newest; after as many turns they stand as they did.
-        current = refined(bench, base, current.ordered([count - 1, *range(count - 1)]), tell)
+        current = current.ordered([count - 1, *range(count - 1)])
+        if worth[count - 2 - k]:
+            current = refined(bench, base, current, tell)
     return current
 
 

@@ -42,6 +42,10 @@ INSIDE = 0.8
 #: What another effect leaves beside the noise, in its units, to be seen to be wrong where the best one has
 #: reached the noise, in however few blocks of time.
 SEEN = 0.5
+#: Part of the first pass's structure that an effect must explain for a finer formula of it to be looked for.
+#: Plain formulas of other laws leave up to 0.14 of it (calibration cases of `numpy`, seeds 84 to 138): of a
+#: smaller one that is less than a further effect must explain (``BEYOND_GAIN`` of a search).
+WORTH_FINER = 0.03
 #: Loss of explained power, as a part of it, within which two effects count as the same trace.
 SAME = 0.02
 #: The same for effects that are known to look alike, when neither reaches the noise.
@@ -94,6 +98,14 @@ class Named:
     less: Fit | None = None
     alike: frozenset[str] = frozenset()
     instead_of: frozenset[str] = frozenset()
+
+    @property
+    def worth_finer(self) -> bool:
+        """Whether a finer formula could explain as much as a further effect would have to.
+
+        What a formula errs by is a part of what its effect explains, and costs many fits to find.
+        """
+        return self.gain >= WORTH_FINER
 
     def look_alikes(self, bench: Bench, before: Fit) -> list[Fit]:
         """The alternatives that look like it and explain nearly as much, those that leave least first.

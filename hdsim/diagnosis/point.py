@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, at_present
+from hdsim.estimate.fit import Fit, at_present, fit
 from hdsim.estimate.numbers import scaled
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
@@ -73,3 +73,24 @@ def as_given(bench: Bench, found: Fit) -> Fit | None:
         found, state=there.state, frees=frees, theta=np.zeros(len(frees)), predictions=there.predictions,
         columns=there.columns,
     )  # fmt: skip
+
+
+def from_where_it_was(bench: Bench, base: Fit, earlier: Fit | None) -> dict[str, tuple[Fit, bool]]:
+    """An only effect that was fitted before samples were left out, fitted on from there, as a contest has it.
+
+    A base that was bent by all that is missing may be far from there, and the way long.
+
+    Args:
+        bench: the measured series, without those samples.
+        base: the re-fitted model without effects.
+        earlier: the fit beside the samples that count no more.
+    """
+    if earlier is None or len(earlier.state.added) != 1:
+        return {}
+    was, frees = {free.name: free.none for free in at_present(earlier)}, at_present(base)
+    theta = {free.name: free.none - was[free.name] for free in frees if free.name in was}
+    state = replace(base.state, added=earlier.state.added)
+    with bench.coarse(), contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        found = fit(bench, state, frees, prune=False, theta=theta, after=base, rough=True)
+        return {earlier.state.added[0].effect: (found, True)}
+    return {}

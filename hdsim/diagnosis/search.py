@@ -16,25 +16,25 @@ from functools import partial
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines
+from hdsim.diagnosis.beyond import beyond_curves
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.effort import MOST_EFFECTS, MOST_STAGES, enough_done, more_could
 from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.held import hopeless
 from hdsim.diagnosis.late import lines_shown, read_late
-from hdsim.diagnosis.locate import SHARP, Location, curves_over, locate
+from hdsim.diagnosis.locate import SHARP, Location, locate
 from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
-from hdsim.diagnosis.point import as_given
+from hdsim.diagnosis.point import as_given, from_where_it_was
 from hdsim.diagnosis.rest import hear_rest
 from hdsim.diagnosis.revise import base_alone, revised
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.swing import hear_swing
 from hdsim.diagnosis.traces import Screening, ranked_anew, screen
-from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
 from hdsim.estimate.orders import lines_of
-from hdsim.estimate.refit import align, reweigh, together, unlikelihood, with_delays
+from hdsim.estimate.refit import align, as_far_as_promised, reweigh, together, unlikelihood, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 
 #: Part of what a channel lacked at first that a later effect must explain where a smooth curve over the
@@ -61,7 +61,8 @@ class Search:
     """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit.
 
     ``better`` is the base without effects where its own numbers explain what the only one was given for.
-    Where it has done enough and not all is explained, it has ``ended``.
+    Where it has done enough and not all is explained, it has ``ended``. All begins ``anew`` where a vibration
+    at the beginning of a record, or a shaft that sticks, was behind the first effects: it counts no more.
     """
 
     fit: Fit
@@ -69,12 +70,20 @@ class Search:
     stages: list[Stage] = field(default_factory=list)
     named: list[Named] = field(default_factory=list)
     better: Fit | None = None
+    thorough: bool = False
+    earlier: Fit | None = None
     ended: bool = False
+    anew: bool = False
 
 
 def search(
-    bench: Bench, base: Fit, during: Callable[[str, str], Step], *, thorough: bool = False
-) -> Search | None:
+    bench: Bench,
+    base: Fit,
+    during: Callable[[str, str], Step],
+    *,
+    thorough: bool = False,
+    earlier: Fit | None = None,
+) -> Search:
     """Add effects until nothing significant is left.
 
     Args:
@@ -82,16 +91,14 @@ def search(
         base: the re-fitted model.
         during: told the step that begins and what it does; returns who is told the details.
         thorough: look for further effects whatever it takes (``hdsim.diagnosis.effort``).
-
-    Returns:
-        None where a vibration at the beginning of a record, or a shaft that sticks, was behind the first
-            effects: it does not count any more, and all begins anew.
+        earlier: the last fit of a search after which all began anew.
     """
-    found, last = Search(base, left_of(bench, base)), base
+    found, last = Search(base, left_of(bench, base), thorough=thorough, earlier=earlier), base
     while True:
         if found.named and (hear_swing(bench, found.fit) or hear_rest(bench, last, found.fit)):
-            return None
-        following = _next(bench, base, found, during, thorough)
+            found.anew = True
+            return found
+        following = _next(bench, base, found, during)
         if following is not None:
             last, found.fit = found.fit, following
             follow_teeth(bench, base.state, following.state)
@@ -117,7 +124,8 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
     """The search's last fit carried on to its optimum, without needless names, with the covariance there."""
     if len(found.named) > 1:
         # What another effect did may have hidden what a finer formula does.
-        found.fit = each_refined(bench, base, found.fit, partial(during, "fit"))
+        worth = [one.worth_finer for one in found.named]
+        found.fit = each_refined(bench, base, found.fit, partial(during, "fit"), worth)
     found.fit = together(bench, found.fit)
     if found.named:
         tell = during("again", "testing each effect beside the others")
@@ -148,9 +156,7 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
     return found
 
 
-def _next(
-    bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step], thorough: bool
-) -> Fit | None:
+def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Fit | None:
     """The model with one more effect; None when nothing significant is left, or nothing that matters."""
     current = found.fit = read_late(bench, found.fit)
     title = "refit" if not found.named else f"with {found.named[-1].name}"
@@ -167,10 +173,12 @@ def _next(
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
     more = not found.named or stage.location.sharp(LEVEL) or more_could(bench, base, current)
-    found.ended = more and not thorough and enough_done(bench, len(found.stages) - 1)
+    found.ended = more and not found.thorough and enough_done(bench, len(found.stages) - 1)
     if found.ended or not more:
         return None
-    fitted: Fitted = {}
+    fitted: Fitted = {} if found.named else from_where_it_was(bench, base, found.earlier)
+    if fitted:
+        stage.over_given = []  # that has been asked before
     named = _one_more(bench, base, current, found, stage, bool(found.named), during, fitted)
     if found.named and (named is None or named.of_left < MOST):
         within = _one_more(bench, base, current, found, stage, False, during, fitted)
@@ -188,10 +196,12 @@ def _next(
         # A base that carried nothing could tell nothing of its springs.
         current = together(bench, current, rough=True) if current.undetermined else current
         current = sharpened(bench, current)
-    own, rivals = current, named.look_alikes(bench, found.fit)
-    current = refined(bench, base, own, partial(during, "fit"), rivals)
-    if current.state.added[-1].effect != named.name:
-        named.gives_way(bench, found.fit, own, current)
+    if named.worth_finer:
+        own, rivals = current, named.look_alikes(bench, found.fit)
+        current = refined(bench, base, own, partial(during, "fit"), rivals)
+        if current.state.added[-1].effect != named.name:
+            named.gives_way(bench, found.fit, own, current)
+    current = as_far_as_promised(bench, current)
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
@@ -314,37 +324,3 @@ def _named_over_the_given(
     named = name_effect(bench, given, screening, left, on_step=tell, alone=current)
     if named is not None:
         yield named, screening
-
-
-def beyond_curves(bench: Bench, current: Fit, left: Residual) -> Residual:
-    """A residual without what smooth curves over the coordinates of the added effects explain.
-
-    An exact formula leaves nothing there: what is left in its coordinate is another's.
-    """
-    homes = {
-        (coordinate, channel)
-        for one, channels in zip(current.state.added, shown_in(bench, current), strict=True)
-        if not catalogue()[one.effect].signature.exact
-        for coordinate in one.lives_in
-        for channel in channels
-    }
-    residuals = bench.residuals(current.predictions, drift=True)
-    curves = curves_over(bench, residuals, homes, current.state.delays)
-    return Residual(left.values, np.hstack([left.base, curves]), bench.stacked_blocks())
-
-
-def shown_in(bench: Bench, current: Fit) -> list[list[str]]:
-    """Channels in which each added effect shows more than the noise: in others it can leave nothing."""
-    numbers, noise = bench.stacked_series(), bench.noise_powers
-    found = []
-    for k, added in enumerate(current.state.added):
-        columns = current.columns[:, current.numbers_of(k)][:, : len(added.coefficients)]
-        powers = (columns @ np.array(added.coefficients)) ** 2
-        own = {
-            channel: sum(
-                float(powers[numbers == k].sum()) for k, s in enumerate(bench.series) if s.channel == channel
-            )
-            for channel in bench.channels
-        }
-        found.append([channel for channel in bench.channels if own[channel] > noise[channel]])
-    return found

@@ -179,11 +179,13 @@ def _diagnosed(
         return tell
 
     jumps: list[Jump] = []
+    earlier: Fit | None = None
     with running:
         while True:
-            found = search(bench, base.fit, during, thorough=thorough)
-            if found is None:
+            found = search(bench, base.fit, during, thorough=thorough, earlier=earlier)
+            if found.anew:
                 # The first effects have shown samples that do not count.
+                earlier = found.fit
                 during("refit", "re-fitting the parameters of the model")
                 base = _refitted(bench, start)
             elif found.better is not None:

@@ -12,7 +12,7 @@ import numpy as np
 from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import robust_covariance
-from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled, strain
+from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled, sharpened, strain
 from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
 from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
@@ -31,6 +31,8 @@ WEIGHINGS, ALIKE = 3, 1.5
 ALL = 0.1
 #: Part of what a re-fit leaves beside the noise that numbers which it did not move must explain to be moved.
 MUCH = 0.1
+#: Most times that a fit short of its end is carried on.
+CARRIED_ON = 6
 #: Most times that the beginnings of records are asked.
 BEGINNINGS = 3
 #: Prior spreads that a number may have gone for a fit to begin at the given one too.
@@ -184,6 +186,35 @@ def at_its_end(bench: Bench, found: Fit) -> Fit:
         if _weights_risen(bench, found).max() < ALIKE:
             break
     return found
+
+
+def as_far_as_promised(bench: Bench, found: Fit) -> Fit:
+    """A fit carried on while it promises, and keeps, that much of what it leaves beside the noise will go.
+
+    Short of its end it leaves what looks like another effect.
+    """
+    for _ in range(CARRIED_ON):
+        left = bench.power(found.predictions) - bench.noise_power
+        if left <= (REACHED - 1.0) * bench.noise_power or _promised(bench, found) < MUCH * left:
+            break
+        known = found.columns, math.nan
+        on = fit(bench, found.state, at_present(found), prune=False, known=known, after=found, rough=True)
+        if bench.power(on.predictions) - bench.noise_power > (1.0 - MUCH) * left:
+            break
+        found = sharpened(bench, on)
+    return found
+
+
+def _promised(bench: Bench, found: Fit) -> float:
+    """Part of the power of what a fit leaves that its sensitivities would take away, its priors heeded."""
+    rest = bench.stacked(bench.residuals(found.predictions))
+    worth = 1.0 / math.sqrt(bench.sample_power(rest))
+    vector = Vector(found.state, tuple(at_present(found)), 0)
+    whole = np.vstack([worth * found.columns, np.diag(1.0 / vector.priors())])
+    x0 = vector.start()
+    aim = np.concatenate([worth * rest, (vector.centre(x0) - x0) / vector.priors()])
+    moves, *_ = np.linalg.lstsq(whole, aim, rcond=1e-6)
+    return float(rest @ rest - np.sum((rest - found.columns @ moves) ** 2))
 
 
 def _with_those_left(bench: Bench, found: Fit) -> Fit:

@@ -129,7 +129,7 @@ def test_gaps_that_differ_are_asked_from_where_many_teeth_end(monkeypatch: pytes
 def test_a_play_beside_another_effect_is_refined_though_it_is_not_the_newest() -> None:
     other = "load_side_friction"
     bench, base, plain = with_play(LUMPED, {PLAY: MANY, other: {"coulomb_nm": 3.0}}, beside=(other,))
-    found = each_refined(bench, base, plain, lambda _: None)
+    found = each_refined(bench, base, plain, lambda _: None, [True, True])
     assert [one.effect for one in plain.state.added] == [PLAY, other]
     assert [one.effect for one in found.state.added] == [PLAY, other]
     assert [one.fitting.label for one in found.state.added] == ["of many teeth", ""]
@@ -152,3 +152,28 @@ def test_a_fit_that_has_come_to_its_end_is_not_carried_on_again(falls, fits, mon
     )
     assert finer._at_their_ends(bench, [(None, [])]) == [made[-1]]
     assert len(made) == fits
+
+
+def test_only_effects_that_are_worth_it_are_asked_for_a_finer_formula(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    names = ["kinematic_error", PLAY, "stribeck_friction"]
+    asked: list[str] = []
+
+    class Ordered:
+        """A fit of which only the order of its effects matters."""
+
+        def __init__(self, effects: Sequence[str]) -> None:
+            self.state = SimpleNamespace(added=list(effects))
+
+        def ordered(self, effects: Sequence[int]) -> Any:
+            return Ordered([self.state.added[k] for k in effects])
+
+    def once(bench: object, base: object, current: Ordered, tell: object) -> Ordered:
+        asked.append(current.state.added[-1])
+        return current
+
+    monkeypatch.setattr(finer, "refined", once)
+    found = each_refined(None, None, Ordered(names), lambda _: None, [True, False, True])
+    assert found.state.added == names
+    assert sorted(asked) == ["kinematic_error", "stribeck_friction"]
