@@ -42,6 +42,7 @@ from hdsim.estimate.drift import drifted
 from hdsim.estimate.fit import Fit, base_intervals
 from hdsim.estimate.found import DataProblem, Gap
 from hdsim.estimate.jumps import Jump, jumped, take_back_jumps
+from hdsim.estimate.off import wrong_numbers
 from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
@@ -49,7 +50,7 @@ from hdsim.estimate.plan import LoadSource
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import gaps, unseen
 from hdsim.estimate.records import Array, Record
-from hdsim.estimate.refit import Refit, align, refit, tie
+from hdsim.estimate.refit import Refit, align, refit
 from hdsim.estimate.repeat import with_repeats
 from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.state import State, state_of
@@ -256,10 +257,9 @@ def _diagnosed(
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)
-    moved = [i for i in intervals if i.moved]
-    off = moved
-    if decision.kind == "parameter" and not moved:
-        off = tie(bench, base.before, current, intervals)
+    off, sure = [i for i in intervals if i.moved], True
+    if decision.kind == "parameter":
+        off, sure = wrong_numbers(bench, base.before, current, intervals)
         if not off:
             decision.kind = "nothing"
     rest = remains(evidence) if named else None
@@ -293,7 +293,7 @@ def _diagnosed(
             teeth = teeth_found(effects, current.state, (bench, current))
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
-        verdict = numbers_off(off, current, common, sure=bool(moved))
+        verdict = numbers_off(off, current, common, sure=sure)
     else:
         said = "The data show no effect that is missing from the model."
         verdict = Verdict(verdict="nothing", sentence=said, **common)

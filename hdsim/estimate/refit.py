@@ -23,8 +23,6 @@ from hdsim.estimate.state import State
 from hdsim.estimate.unwound import turn_to_zero, zeros_beside
 from hdsim.estimate.vector import Vector, sensitivities
 
-#: Part of what the number that can do most alone can do, for another to do as well.
-ALONE = 0.8
 #: Most fits under weights that follow from the one before, and factor between the weights that ends them.
 WEIGHINGS, ALIKE = 3, 1.5
 #: Part of what is left beside the noise below which the delays that leave it are believed at once.
@@ -61,33 +59,6 @@ class Refit:
     def moved(self) -> list[Interval]:
         """Numbers whose start value lies outside their interval."""
         return [interval for interval in self.intervals if interval.moved]
-
-
-def tie(bench: Bench, before: Sequence[Array], found: Fit, intervals: Sequence[Interval]) -> list[Interval]:
-    """Numbers each of which would do most of what a fit did alone, the best first, tied to one another.
-
-    They stand in for one another: no interval may exclude its start value, although one of them is off.
-
-    Args:
-        bench: the measured series.
-        before: predictions of the model as given.
-        found: the fit.
-        intervals: its numbers; those that are found are marked as tied.
-    """
-    columns, frees = found.columns[:, : len(found.frees)], list(found.frees)
-    if found.beside is not None:
-        there = found.beside[0][:, : len(found.undetermined)]
-        columns, frees = np.hstack([columns, there]), frees + found.undetermined
-    if not frees:
-        return []
-    along = columns.T @ bench.trace(before, found.predictions)
-    power = along**2 / np.maximum((columns**2).sum(axis=0), 1e-300)
-    by_name = {interval.name: interval for interval in intervals}
-    order = [int(k) for k in np.argsort(-power) if power[k] >= ALONE * power.max()]
-    tied = [by_name[frees[k].name] for k in order]
-    for one in tied:
-        one.tied_to = [other.name for other in tied if other is not one]
-    return tied
 
 
 def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Refit:

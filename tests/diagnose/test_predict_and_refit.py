@@ -14,9 +14,10 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import robust_covariance
 from hdsim.estimate.fit import base_intervals, fit
 from hdsim.estimate.numbers import Free, Interval, base_freedoms
+from hdsim.estimate.off import tie
 from hdsim.estimate.predict import Predictor, plan_for, predictors
 from hdsim.estimate.records import Record
-from hdsim.estimate.refit import refit, tie, together, with_delays
+from hdsim.estimate.refit import refit, together, with_delays
 from hdsim.estimate.spline import pieces_of, smoothed, spline_through
 from hdsim.estimate.state import Added, state_of
 from hdsim.estimate.suspect import delays

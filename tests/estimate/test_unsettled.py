@@ -65,10 +65,14 @@ def test_without_play_it_comes_to_rest(load_kg_m2):
 
 
 @pytest.mark.parametrize(("promised", "said"), [(2.9, False), (12.0, True)])
-def test_it_is_said_from_a_standard_error_of_each_number_on(promised, said):
+@pytest.mark.parametrize("play_arcmin", [0.0, 0.5])
+def test_it_is_said_from_a_standard_error_of_each_number_on(promised, said, play_arcmin):
     bench = SimpleNamespace(predictors=[SimpleNamespace(record=SimpleNamespace(name="sweep"))])
-    found = unsettled(bench, SimpleNamespace(columns=np.zeros((100, 3)), promised=promised))
+    state = state_of(drive(play_arcmin, 3.0))
+    found = unsettled(bench, SimpleNamespace(columns=np.zeros((100, 3)), promised=promised, state=state))
     assert bool(found) == said
     if said:
         assert found[0].record == "sweep"
         assert "by 2 standard errors" in found[0].message
+        # A load is free only where there is something to be free in.
+        assert ("free in a play" in found[0].message) == (play_arcmin > 0.0)
