@@ -1,4 +1,4 @@
-"""Baselines: RMS residuals of regressions on the held-out data, beside the model's."""
+"""What is said beside a verdict: regressions on the held-out data, and parameters that effects have moved."""
 
 from __future__ import annotations
 
@@ -6,10 +6,24 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from hdsim.estimate.found import Gap
+from hdsim.tell.wording import changed, standard_errors
 from hdsim.tell.words import short, spoken, unit_of
 
 if TYPE_CHECKING:
     from hdsim.diagnosis.verdict import Verdict
+
+#: Standard errors from which a parameter is said to have moved beside an effect: of 20 parameters one is that
+#: far off by chance in one record of twenty (two-sided, normal).
+FAR = 3.0
+
+
+def also_moved(verdict: Verdict) -> str:
+    """Parameters of the model that have changed beside the identified effects, as a sentence."""
+    if verdict.verdict != "effect":
+        return ""
+    numbers = {name: verdict.parameters[name] for name in verdict.moved if name in verdict.parameters}
+    said = [changed(name, number) for name, number in numbers.items() if standard_errors(number) >= FAR]
+    return f"Beside that the fit has changed: {', '.join(said)}." if said else ""
 
 
 def last_model(verdict: Verdict) -> str:

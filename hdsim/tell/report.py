@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hdsim.tell import figures, sections
-from hdsim.tell.beside import baselines, last_model
+from hdsim.tell.beside import also_moved, baselines, last_model
 from hdsim.tell.figures_where import located_figure
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import GAP_HEAD, gap_rows, section, table
@@ -151,6 +151,7 @@ def _head(found: Findings) -> str:
     said = headline(found)
     long = " class='long'" if len(said) > LONG else ""
     listed = "".join(f"<li>{html.escape(line)}</li>" for line in gains(verdict))
+    means = f"{meaning(found)} {also_moved(verdict)}".rstrip()
     unseen = "RMS residual on held-out data:" if verdict.gap else "No data were held out."
     return (
         "<header class='verdict'><p "
@@ -159,7 +160,8 @@ def _head(found: Findings) -> str:
         f"class='number'>{html.escape(sure.number)}</span></p>"
         + (f"<p class='left'>But {html.escape(sure.left)}.</p>" if sure.left else "")
         + "".join(f"<p>{html.escape(line)}</p>" for line in sure.details)
-        + f"</div><div><h2>What it means</h2><p>{html.escape(meaning(found))}</p>{_pointers(verdict)}</div>"
+        + f"</div><div><h2>What it means</h2><p>{html.escape(means)}</p>"
+        f"{_pointers(verdict)}</div>"
         f"<div><h2>Validation</h2><p>{unseen}</p><ul>{listed}</ul></div></div></header>"
     )
 

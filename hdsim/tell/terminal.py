@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hdsim.console import console
 from hdsim.tell.because import conditions, weighings
-from hdsim.tell.beside import baselines, last_model
+from hdsim.tell.beside import also_moved, baselines, last_model
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import gap_rows, with_curve_words
 from hdsim.tell.wording import KINDS, headline, sureness
@@ -86,6 +86,8 @@ def show(found: Findings, terminal: Console | None = None) -> None:
     line((verdict.verdict, f"bold {_COLOURS[verdict.verdict]}"), ": ", (KINDS[verdict.verdict], "bold"))
     line(headline(found))
     line(sure.sentence)
+    if beside := also_moved(verdict):
+        line(beside)
     if verdict.gap:
         table = Table(box=SIMPLE_HEAD, title="\nRMS residual on held-out data", **_STYLE)
         for name in _HEAD:

@@ -116,7 +116,7 @@ def _off(verdict: Verdict) -> str:
         "one parameter of the model is wrong" if many == 1 else f"{many} parameters of the model are wrong"
     )
     changes = (
-        _change(name, verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters
+        changed(name, verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters
     )
     return f"No effect is missing; {count}: {', '.join(changes)}."
 
@@ -191,7 +191,8 @@ def _unsure(verdict: Verdict) -> bool:
     )
 
 
-def _change(name: str, number: ParameterEstimate) -> str:
+def changed(name: str, number: ParameterEstimate) -> str:
+    """A parameter with its new value and the old one."""
     words, unit = named_number(name)
     start = "" if number.start is None else f" instead of {shown(number.start)}"
     return f"{words} {shown(number.value)}{start} {unit}".rstrip()
@@ -314,11 +315,14 @@ def _of_the_unknown(found: Findings) -> Sureness:
 
 def farthest(verdict: Verdict) -> float:
     """Distance of the estimate that moved farthest from the model's value, in standard errors."""
-    found = [_distance(verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters]
+    found = [
+        standard_errors(verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters
+    ]
     return max(found, default=0.0)
 
 
-def _distance(number: ParameterEstimate) -> float:
+def standard_errors(number: ParameterEstimate) -> float:
+    """Distance of an estimate from the model's value."""
     if number.interval is None or number.start is None:
         return 0.0
     low, high = number.interval

@@ -1,9 +1,11 @@
 """What is said of each kind of verdict, from evidence written by hand."""
 
+import io
 import math
 
 import numpy as np
 import pytest
+from rich.console import Console
 from telling import (
     EFFECT,
     GAP,
@@ -25,6 +27,8 @@ from hdsim.diagnosis.further import CurveFound
 from hdsim.diagnosis.remains import remains
 from hdsim.diagnosis.verdict import Remainder, TeethFound
 from hdsim.estimate.found import ParameterEstimate
+from hdsim.tell.beside import also_moved
+from hdsim.tell.terminal import show
 from hdsim.tell.wording import farthest, headline, meaning, much_left, sureness
 
 FRICTION = "drive.friction.coulomb_nm"
@@ -247,3 +251,20 @@ def test_what_a_verdict_says_of_teeth_is_said_where_it_says_what_it_means():
     written = teeth.model_copy(update={"scenario": "out/toothed.yaml"})
     said = meaning(type(found)(found.verdict.model_copy(update={"teeth": written}), EFFECT))
     assert said.endswith("toothed.yaml.")
+
+
+def test_parameters_that_moved_beside_an_effect_are_told_and_those_that_may_be_chance_are_not(tmp_path):
+    far = ParameterEstimate(value=0.439, interval=(0.41, 0.47), start=0.087)
+    near = ParameterEstimate(value=0.021, interval=(0.0201, 0.0219), start=0.02)
+    numbers = {"drive.friction.load_coefficient": far, FRICTION: near}
+    moved = {"parameters": numbers, "moved": list(numbers)}
+    found = told(EFFECT, **moved)
+    said = also_moved(found.verdict)
+    assert said == "Beside that the fit has changed: load coefficient of friction 0.439 instead of 0.087."
+    assert said in page(found, tmp_path)
+    terminal = Console(width=100, record=True, file=io.StringIO())
+    show(found, terminal)
+    assert said in " ".join(terminal.export_text().split())
+    assert also_moved(told(EFFECT, parameters={FRICTION: near}, moved=[FRICTION]).verdict) == ""
+    # Of a wrong parameter the headline speaks itself.
+    assert also_moved(told(PARAMETER, **moved).verdict) == ""
