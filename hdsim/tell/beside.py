@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from hdsim.estimate.found import Gap
-from hdsim.tell.wording import changed, standard_errors
-from hdsim.tell.words import short, spoken, unit_of
+from hdsim.tell.wording import changed
+from hdsim.tell.words import short, spoken, standard_errors, unit_of
 
 if TYPE_CHECKING:
     from hdsim.diagnosis.verdict import Verdict

@@ -20,6 +20,7 @@ from hdsim.tell.words import (
     short,
     shown,
     spoken,
+    standard_errors,
     started,
     times,
     title_of,
@@ -49,8 +50,6 @@ SURE = ((0.95, "Very sure"), (0.8, "Sure"), (0.6, "Fairly sure"), (0.0, "Not sur
 _FAR = ((6.0, "Very sure"), (3.5, "Sure"), (0.0, "Fairly sure"))
 #: Nothing is called very sure with more unexplained: times the noise, share of the systematic residual.
 MUCH_NOISE, MUCH_STRUCTURE = 2.0, 0.1
-#: Standard deviations in a 95 % interval, from end to end; intervals are made of two to each side.
-_INTERVAL = 4.0
 #: How a sentence begins that a warning about the data leads.
 DOUBT = "Check the data first: "
 
@@ -315,23 +314,8 @@ def _of_the_unknown(found: Findings) -> Sureness:
 
 def farthest(verdict: Verdict) -> float:
     """Distance of the estimate that moved farthest from the model's value, in standard errors."""
-    found = [
-        standard_errors(verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters
-    ]
-    return max(found, default=0.0)
-
-
-def standard_errors(number: ParameterEstimate) -> float:
-    """Distance of an estimate from the model's value."""
-    if number.interval is None or number.start is None:
-        return 0.0
-    low, high = number.interval
-    if number.start > 0 and number.value > 0 and low > 0:
-        # Parameters of the model are estimated by their logarithm.
-        spread = math.log(high / low) / _INTERVAL
-        return abs(math.log(number.value / number.start)) / spread if spread > 0 else math.inf
-    spread = (high - low) / _INTERVAL
-    return abs(number.value - number.start) / spread if spread > 0 else math.inf
+    numbers = (verdict.parameters[name] for name in verdict.moved if name in verdict.parameters)
+    return max(map(standard_errors, numbers), default=0.0)
 
 
 def gains(verdict: Verdict) -> list[str]:

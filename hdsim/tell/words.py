@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from hdsim.diagnosis.verdict import IdentifiedEffect
-from hdsim.estimate.found import Gap, ShortCut
+from hdsim.estimate.found import Gap, ParameterEstimate, ShortCut
 from hdsim.plot import units
 from hdsim.scenario.fields import split_unit
 
 #: What stands where a number is not known.
 UNKNOWN = "not known"
+#: Standard deviations in a 95 % interval, from end to end; intervals are made of two to each side.
+_INTERVAL = 4.0
 #: Odds beyond which they are only said to be large.
 LARGE_ODDS = 1000.0
 #: Words of names that are written with capital letters.
@@ -177,3 +179,16 @@ def title_of(name: str) -> str:
 def titles_of(effect: IdentifiedEffect) -> list[str]:
     """The effect's title, and the titles of those that the data cannot distinguish from it."""
     return [effect.title or spoken(effect.name), *map(title_of, effect.indistinguishable_from)]
+
+
+def standard_errors(number: ParameterEstimate) -> float:
+    """Distance of an estimate from the model's value."""
+    if number.interval is None or number.start is None:
+        return 0.0
+    low, high = number.interval
+    if number.start > 0 and number.value > 0 and low > 0:
+        # Parameters of the model are estimated by their logarithm.
+        spread = math.log(high / low) / _INTERVAL
+        return abs(math.log(number.value / number.start)) / spread if spread > 0 else math.inf
+    spread = (high - low) / _INTERVAL
+    return abs(number.value - number.start) / spread if spread > 0 else math.inf
