@@ -58,10 +58,10 @@ WORDINGS = {
     ),
     "part of what is left that is structure": Wording("systematic share of the residual", _part, "at least"),
     "what is left, in units of the noise": Wording(
-        "residual of the worst channel, relative to its noise", times, "more than"
+        "training residual of the worst channel, relative to its noise", times, "more than"
     ),
     "excess over the noise of a reading": Wording(
-        "power of the worst channel's residual beyond the noise of a single reading", _part, "at least"
+        "power of the worst training residual beyond the noise of a single reading", _part, "at least"
     ),
     "the re-fit closes a held-out gap": Wording(
         "reduction of a held-out residual by the re-fit", _part, "at least"

@@ -219,7 +219,7 @@ def sureness(found: Findings) -> Sureness:
     worst = max(ratios, default=math.nan)
     words = "Nothing missing is detected" if found.search_chance > LEVEL else "No effect can be identified"
     if math.isfinite(worst):
-        return Sureness(words, f"the residual is {times(worst)} the noise", (more,))
+        return Sureness(words, f"the held-out residual is {times(worst)} the noise", (more,))
     return Sureness(words, f"p-value {percent(found.search_chance)}", (more,))
 
 
