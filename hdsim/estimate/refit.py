@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
 from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.offsets import part_zeros
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.standstill import hear_standstill
 from hdsim.estimate.state import State
@@ -164,15 +166,16 @@ def as_far_as_promised(bench: Bench, found: Fit) -> Fit:
 
     Short of its end it leaves what looks like another effect.
     """
-    for _ in range(CARRIED_ON):
-        left = bench.power(found.predictions) - bench.noise_power
-        if left <= (REACHED - 1.0) * bench.noise_power or _promised(bench, found) < MUCH * left:
-            break
-        known = found.columns, math.nan
-        on = fit(bench, found.state, at_present(found), prune=False, known=known, after=found, rough=True)
-        if bench.power(on.predictions) - bench.noise_power > (1.0 - MUCH) * left:
-            break
-        found = sharpened(bench, on)
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        for _ in range(CARRIED_ON):
+            left = bench.power(found.predictions) - bench.noise_power
+            if left <= (REACHED - 1.0) * bench.noise_power or _promised(bench, found) < MUCH * left:
+                break
+            known = found.columns, math.nan
+            on = fit(bench, found.state, at_present(found), prune=False, known=known, after=found, rough=True)
+            if bench.power(on.predictions) - bench.noise_power > (1.0 - MUCH) * left:
+                break
+            found = sharpened(bench, on)
     return found
 
 
