@@ -251,7 +251,9 @@ def _diagnosed(
     # Of the final model: what the re-fit alone had bent, effects and a curve may have set right.
     doubts = suspicions(bench, replace(base, fit=current), start)
     problems += [*doubts, *beginnings(bench), *one_way(bench), *moving_zeros(bench, current.predictions)]
-    problems += [*unseen(bench, predictions["after"]), *jumped(bench, jumps), *unsettled(bench, current)]
+    silent = decision.kind in ("nothing", "parameter")
+    problems += unseen(bench, predictions["after"], slightly=silent)
+    problems += [*jumped(bench, jumps), *unsettled(bench, current)]
     if found.ended:
         problems.append(told_of_end(bench, len(found.stages) - 1))
     intervals = base_intervals(current, base.freedoms)

@@ -1,6 +1,7 @@
 """What only the model can tell: scales of torques that stand alone, and logs of other drives."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -136,7 +137,7 @@ def test_a_re_fit_that_fails_once_all_begins_anew_is_told(tmp_path, monkeypatch)
         return fitted[0]
 
     monkeypatch.setattr(workflow, "refit", fails_at_last)
-    monkeypatch.setattr(workflow, "search", lambda *_, **options: None)
+    monkeypatch.setattr(workflow, "search", lambda *_, **options: SimpleNamespace(anew=True, fit=None))
     with pytest.raises(InputError, match="r: the model cannot follow the measured motion: it ran away"):
         workflow.diagnose([scaled()], scenario(tmp_path))
 

@@ -40,6 +40,19 @@ def test_what_only_held_out_data_show_is_said(trained, held):
         assert not found
 
 
+@pytest.mark.parametrize(("amplitude_arcmin", "said"), [(0.0, False), (0.036, True)])
+def test_a_little_that_only_held_out_data_show_is_said_where_no_effect_is_named(amplitude_arcmin, said):
+    effects = {"kinematic_error": {"components": [{"order": 2, "amplitude_arcmin": amplitude_arcmin}]}}
+    base = Scenario.model_validate(BASE)
+    for name in ("proof", "another", "a third"):
+        proof = record(effects if amplitude_arcmin else {}, name)
+        bench = bench_for([record({}, "learned")], [proof], base)
+        predictions = bench.predict(state_of(base), everything=True)
+        assert not unseen(bench, predictions)
+        channels = [problem.channel for problem in unseen(bench, predictions, slightly=True)]
+        assert channels == (["output_angle"] if said else [])
+
+
 def both_ways(turns_back_s):
     """A record that turns one way, but for the last half second of 4.5 and what is asked for."""
     plant = deepcopy(BASE)
