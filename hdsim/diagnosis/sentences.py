@@ -59,11 +59,11 @@ def rest_words(remains: Remains | None) -> str:
     return f" {100 * remains.share:.0f} % of the systematic residual remains, a function of the {coordinate}."
 
 
-def numbers_off(off: Sequence[Interval], current: Fit, common: Mapping[str, Any], *, sure: bool) -> Verdict:
+def numbers_off(off: Sequence[Interval], current: Fit, common: Mapping[str, Any]) -> Verdict:
     """``parameter``, with those that are wrong."""
     changes = [f"{i.name} {i.value:.4g} instead of {i.start:.4g} {i.unit}".rstrip() for i in off]
     said = f"parameters of the model are wrong: {', '.join(changes)}.{_or_in_series(off, current)}"
-    if not sure:
+    if not all(i.moved for i in off):
         said = f"a parameter of the model is wrong, most simply {' or '.join(i.name for i in off)}."
     return Verdict(verdict="parameter", sentence=f"No effect is missing; {said}", **common)
 

@@ -118,8 +118,8 @@ class Verdict(Part):
     parameters: dict[str, ParameterEstimate] = {}
     """Estimates of the base model's parameters."""
     moved: list[str] = []
-    """Those whose interval excludes the base model's value; where there is none although the re-fit reduces a
-    held-out residual, those that would do so alone."""
+    """Those whose interval excludes the base model's value; where the re-fit reduces a held-out residual and
+    they do not explain most of what it changed, those that would do so alone."""
     gap: dict[str, Gap] = {}
     """Held-out RMS residuals by channel."""
     located: list[Located] = []
@@ -156,3 +156,8 @@ class Verdict(Part):
     """How predictions with teeth were made; null without teeth."""
     seconds: dict[str, float] = {}
     """Processor time spent in each step, s."""
+
+    @property
+    def moved_parameters(self) -> dict[str, ParameterEstimate]:
+        """The estimates of those that moved, in that order."""
+        return {name: self.parameters[name] for name in self.moved if name in self.parameters}

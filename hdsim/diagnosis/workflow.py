@@ -259,9 +259,9 @@ def _diagnosed(
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     problems += delays(bench, intervals)
-    off, sure = [i for i in intervals if i.moved], True
+    off = [i for i in intervals if i.moved]
     if decision.kind == "parameter":
-        off, sure = wrong_numbers(bench, base.before, current, intervals)
+        off = wrong_numbers(bench, base.before, current, intervals)
         if not off:
             decision.kind = "nothing"
     rest = remains(evidence) if named else None
@@ -295,7 +295,7 @@ def _diagnosed(
             teeth = teeth_found(effects, current.state, (bench, current))
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
-        verdict = numbers_off(off, current, common, sure=sure)
+        verdict = numbers_off(off, current, common)
     else:
         said = "The data show no effect that is missing from the model."
         verdict = Verdict(verdict="nothing", sentence=said, **common)

@@ -24,8 +24,8 @@ MOST = 0.5
 
 def wrong_numbers(
     bench: Bench, before: Sequence[Array], found: Fit, intervals: Sequence[Interval]
-) -> tuple[list[Interval], bool]:
-    """The numbers that are wrong, and whether each is; otherwise one of them is, or those they are tied to.
+) -> list[Interval]:
+    """The numbers that are wrong: all that moved, or others that did not, of which one is.
 
     Args:
         bench: the measured series.
@@ -35,9 +35,8 @@ def wrong_numbers(
     """
     moved = [interval for interval in intervals if interval.moved]
     if moved and _done_by(bench, before, found, {interval.name for interval in moved}) >= MOST:
-        return moved, True
-    tied = [interval for interval in tie(bench, before, found, intervals) if not interval.moved]
-    return (tied, False) if tied else (moved, bool(moved))
+        return moved
+    return [interval for interval in tie(bench, before, found, intervals) if not interval.moved] or moved
 
 
 def _done_by(bench: Bench, before: Sequence[Array], found: Fit, names: set[str]) -> float:

@@ -180,7 +180,7 @@ def as_far_as_promised(bench: Bench, found: Fit) -> Fit:
 
 
 def _promised(bench: Bench, found: Fit) -> float:
-    """Part of the power of what a fit leaves that its sensitivities would take away, its priors heeded."""
+    """Power of what a fit leaves that its sensitivities would take away, its priors heeded."""
     rest = bench.stacked(bench.residuals(found.predictions))
     worth = 1.0 / math.sqrt(bench.sample_power(rest))
     vector = Vector(found.state, tuple(at_present(found)), 0)

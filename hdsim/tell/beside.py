@@ -21,8 +21,8 @@ def also_moved(verdict: Verdict) -> str:
     """Parameters of the model that have changed beside the identified effects, as a sentence."""
     if verdict.verdict != "effect":
         return ""
-    numbers = {name: verdict.parameters[name] for name in verdict.moved if name in verdict.parameters}
-    said = [changed(name, number) for name, number in numbers.items() if standard_errors(number) >= FAR]
+    numbers = verdict.moved_parameters.items()
+    said = [changed(name, number) for name, number in numbers if standard_errors(number) >= FAR]
     return f"Beside that the fit has changed: {', '.join(said)}." if said else ""
 
 

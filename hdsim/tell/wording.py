@@ -114,9 +114,7 @@ def _off(verdict: Verdict) -> str:
     count = (
         "one parameter of the model is wrong" if many == 1 else f"{many} parameters of the model are wrong"
     )
-    changes = (
-        changed(name, verdict.parameters[name]) for name in verdict.moved if name in verdict.parameters
-    )
+    changes = (changed(name, number) for name, number in verdict.moved_parameters.items())
     return f"No effect is missing; {count}: {', '.join(changes)}."
 
 
@@ -183,10 +181,9 @@ def meaning(found: Findings) -> str:
 
 def _unsure(verdict: Verdict) -> bool:
     """Whether some parameter is wrong, but no interval excludes the model's value."""
-    numbers = [verdict.parameters[name] for name in verdict.moved if name in verdict.parameters]
     return all(
         n.interval is None or (n.start is not None and n.interval[0] <= n.start <= n.interval[1])
-        for n in numbers
+        for n in verdict.moved_parameters.values()
     )
 
 
@@ -207,7 +204,9 @@ def sureness(found: Findings) -> Sureness:
     more = _nothing_more(found)
     if verdict.verdict == "parameter" and _unsure(verdict):
         falls = [g.refit / g.before for g in verdict.gap.values() if g.before > 0 and math.isfinite(g.refit)]
-        said = "No interval excludes the model's value, but the residual does: the parameters are confounded."
+        said = (
+            "None of their intervals excludes the model's value, but the residual does: they are confounded."
+        )
         number = f"the re-fit reduces a held-out residual to {percent(min(falls, default=math.nan))}"
         return Sureness("Sure that a parameter is wrong, not which", number, (said, more))
     if verdict.verdict == "parameter":
@@ -314,8 +313,7 @@ def _of_the_unknown(found: Findings) -> Sureness:
 
 def farthest(verdict: Verdict) -> float:
     """Distance of the estimate that moved farthest from the model's value, in standard errors."""
-    numbers = (verdict.parameters[name] for name in verdict.moved if name in verdict.parameters)
-    return max(map(standard_errors, numbers), default=0.0)
+    return max(map(standard_errors, verdict.moved_parameters.values()), default=0.0)
 
 
 def gains(verdict: Verdict) -> list[str]:

@@ -20,8 +20,8 @@ def said(moves: dict[str, float], intervals: list[Interval]) -> tuple[list[str],
     frees = [SimpleNamespace(name=name) for name in names]
     found = SimpleNamespace(columns=columns, frees=frees, beside=None, undetermined=[], predictions=change)
     bench = SimpleNamespace(trace=lambda before, after: after)
-    off, sure = wrong_numbers(bench, [], found, intervals)
-    return [one.name for one in off], sure
+    off = wrong_numbers(bench, [], found, intervals)
+    return [one.name for one in off], all(one.moved for one in off)
 
 
 def interval(name: str, low: float, high: float, *, determined: bool = True) -> Interval:
