@@ -9,7 +9,7 @@ more is found, and all is asked once more when they have explained something.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -20,11 +20,12 @@ from hdsim.diagnosis.beyond import beyond_curves
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.effort import MOST_EFFECTS, MOST_STAGES, enough_done, more_could
 from hdsim.diagnosis.finer import each_refined, refined
+from hdsim.diagnosis.given import is_all, over_the_given
 from hdsim.diagnosis.held import hopeless
 from hdsim.diagnosis.late import lines_shown, read_late
 from hdsim.diagnosis.locate import SHARP, Location, locate
 from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
-from hdsim.diagnosis.point import as_given, from_where_it_was
+from hdsim.diagnosis.point import from_where_it_was
 from hdsim.diagnosis.rest import hear_rest
 from hdsim.diagnosis.revise import base_alone, revised
 from hdsim.diagnosis.screen import LEVEL, Residual
@@ -33,7 +34,6 @@ from hdsim.diagnosis.traces import Screening, ranked_anew, screen
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
-from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import align, as_far_as_promised, reweigh, together, unlikelihood, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 
@@ -187,21 +187,19 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
             named = within
     if named is None:
         return None
-    stage.named = named
     if len(found.named) > 1 and hopeless(bench, named.fit, named):
         return None
+    current = _finished(bench, base, found, named, during)
+    if not found.named and not is_all(bench, current):
+        screening = stage.screening
+        other = over_the_given(bench, found.fit, frozenset(), math.inf, stage, named, during)
+        if other is not None and other is not named and _matters(bench, base, found, stage, other, False):
+            its = _finished(bench, base, found, other, during)
+            if unlikelihood(bench, its, its) < unlikelihood(bench, current, its):
+                named, current, screening = other, its, stage.screening
+        stage.screening = screening
+    stage.named = named
     found.named.append(named)
-    current = named.fit
-    if len(found.named) == 1:
-        # A base that carried nothing could tell nothing of its springs.
-        current = together(bench, current, rough=True) if current.undetermined else current
-        current = sharpened(bench, current)
-    if named.worth_finer:
-        own, rivals = current, named.look_alikes(bench, found.fit)
-        current = refined(bench, base, own, partial(during, "fit"), rivals)
-        if current.state.added[-1].effect != named.name:
-            named.gives_way(bench, found.fit, own, current)
-    current = as_far_as_promised(bench, current)
     align(bench, current)
     reweigh(bench, current)
     if len(found.named) > 1:
@@ -219,6 +217,23 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
             found.named[:] = known
             return None
     return current
+
+
+def _finished(
+    bench: Bench, base: Fit, found: Search, named: Named, during: Callable[[str, str], Step]
+) -> Fit:
+    """The model with an effect more, in a finer formula where that explains more, near its optimum."""
+    current = named.fit
+    if not found.named:
+        # A base that carried nothing could tell nothing of its springs.
+        current = together(bench, current, rough=True) if current.undetermined else current
+        current = sharpened(bench, current)
+    if named.worth_finer:
+        own, rivals = current, named.look_alikes(bench, found.fit)
+        current = refined(bench, base, own, partial(during, "fit"), rivals)
+        if current.state.added[-1].effect != named.name:
+            named.gives_way(bench, found.fit, own, current)
+    return as_far_as_promised(bench, current)
 
 
 def _one_more(
@@ -259,68 +274,31 @@ def _one_more(
     coordinate = places[0].coordinate if places else ""
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell, fitted=fitted)
     known_power = bench.power(current.predictions if named is None else named.fit.predictions)
-    if not found.named or known_power > FAR_LEFT_IN * bench.noise_power:
+    if found.named:
         # Beside the effects that are there a linear fit has to come near what is known already.
-        enough = LINEAR * known_power if found.named else math.inf
-        named = _over_the_given(bench, current, instead(found.named), enough, stage, named, during)
-    if named is None:
-        return None
+        enough, ask = LINEAR * known_power, known_power > FAR_LEFT_IN * bench.noise_power
+    else:
+        enough, ask = math.inf, named is None or not _matters(bench, base, found, stage, named, beyond)
+    if ask:
+        named = over_the_given(bench, current, instead(found.named), enough, stage, named, during)
+    return named if named is not None and _matters(bench, base, found, stage, named, beyond) else None
+
+
+def _matters(bench: Bench, base: Fit, found: Search, stage: Stage, named: Named, beyond: bool) -> bool:
+    """Whether an effect explains enough of what is missing, and more than other flanks; sets how much."""
+    current = found.fit
+    left = beyond_curves(bench, current, found.left) if beyond else found.left
     change = left.project(bench.trace(current.predictions, named.fit.predictions))
-    traces = None if found.named else [columns for _, columns in screening.seen.values()]
+    seen = {} if found.named or stage.screening is None else stage.screening.seen
+    traces = None if found.named else [columns for _, columns in seen.values()]
     if float(change @ change) < of_other_flanks(bench, left.project, traces):
-        return None
+        return False
     named.gain = gain(bench, base, current, named.fit)
     named.of_left = float(np.clip(named.candidates[0].explained, 0.0, 1.0))
     sharp = named.fit.state.added[-1].lives_in[0] == SHARP and stage.location.sharp(LEVEL)
     if found.named and sharp:
         # Lines stand out of what is left, however little they are beside what was missing and what still is.
         named.of_lines = part_of_lines(bench, current, named.fit, stage.location.lines)
-        return named
+        return True
     least = LEAST_SHARE if not found.named else BEYOND_GAIN if beyond else WITHIN_GAIN
-    return named if named.gain >= least else None
-
-
-def _over_the_given(
-    bench: Bench,
-    current: Fit,
-    beaten: frozenset[str],
-    enough: float,
-    stage: Stage,
-    named: Named | None,
-    during: Callable[[str, str], Step],
-) -> Named | None:
-    """The next effect, or the one that is named over the base's numbers as given where that is likelier.
-
-    A fit may bend the base far to stand in for a part of what is missing, and what is left then is no trace
-    of it any more.
-    """
-    if stage.over_given is None:
-        stage.over_given = list(_named_over_the_given(bench, current, beaten, enough, during))
-    for other, screening in stage.over_given:
-        if named is None or unlikelihood(bench, other.fit, other.fit) < unlikelihood(
-            bench, named.fit, other.fit
-        ):
-            stage.screening = screening
-            return other
-    return named
-
-
-def _named_over_the_given(
-    bench: Bench, current: Fit, beaten: frozenset[str], enough: float, during: Callable[[str, str], Step]
-) -> Iterator[tuple[Named, Screening]]:
-    """What is named over the base's numbers as given, if they have been bent and anything is."""
-    given = as_given(bench, current)
-    if given is None:
-        return
-    left = left_of(bench, given)
-    lines = lines_of(bench, bench.residuals(given.predictions, drift=True), given.state.delays)
-    tell = during("screen", "screening the catalogue over the model as given")
-    screening = screen(bench, given.state, left, lines, leave_out=beaten, on_step=tell)
-    if not screening.ranked or screening.chance > LEVEL:
-        return
-    if (1.0 - screening.ranked[0].share.share) * left.power > enough:
-        return
-    tell = during("fit", "fitting the shortlist from the model as given")
-    named = name_effect(bench, given, screening, left, on_step=tell, alone=current)
-    if named is not None:
-        yield named, screening
+    return named.gain >= least

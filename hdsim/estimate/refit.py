@@ -27,8 +27,9 @@ from hdsim.estimate.vector import Vector, sensitivities
 
 #: Most fits under weights that follow from the one before, and factor between the weights that ends them.
 WEIGHINGS, ALIKE = 3, 1.5
-#: Part of what is left beside the noise below which the delays that leave it are believed at once.
-ALL = 0.1
+#: Part of what is left beside the noise below which the delays that leave it are believed at once, and what a
+#: rough fit may leave over that to be carried on.
+ALL, NEARLY = 0.1, 2.0
 #: Part of what a re-fit leaves beside the noise that numbers which it did not move must explain to be moved.
 MUCH = 0.1
 #: Most times that a fit short of its end is carried on.
@@ -124,8 +125,9 @@ def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
         found: the fit without them.
         heard: whether samples no longer count that leave more than the others with the delays.
     """
-    late = with_delays(bench, found)
-    if late is None or bench.power(found.predictions) <= bench.noise_power:
+    noise, left = bench.noise_power, bench.power(found.predictions)
+    late = with_delays(bench, found, rough=True) if left > noise else None
+    if late is None or bench.power(late.predictions) - noise > (1.0 - MUCH) * (left - noise):
         return found
     if heard(late):
         found = settled(bench, together(bench, found, rough=True))
@@ -133,9 +135,11 @@ def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
         reweigh(bench, found)
         if bench.power(found.predictions) <= REACHED * bench.noise_power:
             return found
-        late = with_delays(bench, found) or found
-    noise = bench.noise_power
-    if bench.power(late.predictions) - noise >= ALL * (bench.power(found.predictions) - noise):
+        late = with_delays(bench, found, rough=True) or found
+    noise, left = bench.noise_power, bench.power(found.predictions)
+    if bench.power(late.predictions) - noise < NEARLY * ALL * (left - noise):
+        late = settled(bench, late)
+    if bench.power(late.predictions) - noise >= ALL * (left - noise):
         return found
     reweigh(bench, late)
     return late
@@ -288,8 +292,12 @@ def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:
     free = delay_freedoms(found.state, bench.channels, period, load_known=bench.load_known)
     if not free or any(each.step for each in found.frees):
         return None
+    # How a channel is read needs no simulation.
+    late = Vector(found.state, tuple(free), len(found.state.added))
+    own, f = sensitivities(bench, late, late.start(), found.predictions), len(found.frees)
+    known = np.hstack([found.columns[:, :f], own, found.columns[:, f:]]), math.nan
     frees = [*at_present(found), *free]
-    return fit(bench, found.state, frees, prune=False, after=found, rough=rough)
+    return fit(bench, found.state, frees, prune=False, known=known, after=found, rough=rough)
 
 
 def align(bench: Bench, found: Fit) -> None:
