@@ -31,7 +31,7 @@ AT_STAKE = 10.0
 def is_all(bench: Bench, found: Fit) -> bool:
     """Whether a fit has reached the noise without bending the base: then nothing is clearly likelier."""
     reached = bench.power(found.predictions) <= REACHED * bench.noise_power
-    return reached and strain(found) <= AT_STAKE
+    return bool(reached and strain(found) <= AT_STAKE)
 
 
 def over_the_given(

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnose_bench import bent, rigid_record, scenario
 
+from hdsim.diagnosis import search as searching
+from hdsim.diagnosis.given import AT_STAKE, is_all
 from hdsim.diagnosis.point import as_given
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.predict import PredictionError
@@ -52,3 +57,38 @@ def test_where_the_model_as_given_cannot_be_predicted_the_bent_one_is_asked_alon
 
     monkeypatch.setattr(bench, "predict", fails)
     assert as_given(bench, gone) is None
+
+
+def test_a_fit_is_all_where_it_has_reached_the_noise_and_has_not_bent_the_base(fitted):
+    bench, found = fitted
+    assert is_all(bench, found)
+    assert not is_all(bench, bent(bench, found, {INERTIA: 1.8}))
+    # The same predictions, by numbers that were given as others.
+    spread = np.sqrt(AT_STAKE) * found.frees[0].prior
+    for away, expected in ((0.8, True), (1.2, False)):
+        start = replace(found.frees[0], given=found.theta[0] + away * spread)
+        others = [(free, theta) for free, theta in zip(found.frees, found.theta, strict=True)][1:]
+        frees = [start, *(replace(free, given=float(theta)) for free, theta in others)]
+        assert is_all(bench, replace(found, frees=frees)) is expected
+
+
+@pytest.mark.parametrize(("all_explained", "asked"), [(True, 0), (False, 1)])
+def test_a_first_effect_is_asked_for_over_the_given_only_where_one_over_the_fit_is_not_all(
+    fitted, monkeypatch, all_explained, asked
+):
+    bench, found = fitted
+    named, calls = SimpleNamespace(name="motor_torque_ripple", fit=found, worth_finer=False), []
+
+    def over_the_given(*args):
+        calls.append(args)
+        return named
+
+    monkeypatch.setattr(searching, "_one_more", lambda *_: named)
+    monkeypatch.setattr(searching, "_finished", lambda *_: found)
+    monkeypatch.setattr(searching, "over_the_given", over_the_given)
+    monkeypatch.setattr(searching, "is_all", lambda *_: all_explained)
+    monkeypatch.setattr(searching, "nothing_but_flanks", lambda *_: False)
+    search = searching.Search(found, searching.left_of(bench, found))
+    assert searching._next(bench, found, search, lambda *_: lambda _: None) is found
+    assert search.named == [named]
+    assert len(calls) == asked
