@@ -37,7 +37,8 @@ def hear_swing(bench: Bench, found: Fit) -> bool:
     before = _beyond(bench, found)
     if before <= 0.0:
         return False
-    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+    # Whether half of it goes, a search's predictions tell.
+    with bench.coarse(), contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         for _ in range(EARLY):
             if not hear_beginning(bench, found.predictions):
                 break

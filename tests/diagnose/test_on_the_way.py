@@ -15,11 +15,12 @@ from hdsim.diagnosis.point import from_where_it_was
 from hdsim.diagnosis.starts import starts
 from hdsim.effects import catalogue
 from hdsim.estimate import refit as refitting
-from hdsim.estimate.fit import fit
+from hdsim.estimate.fit import fit, sharpened
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.orders import Line
-from hdsim.estimate.refit import as_far_as_promised, refit
+from hdsim.estimate.refit import as_far_as_promised, refit, with_delays
 from hdsim.estimate.state import number_at, state_of
+from hdsim.estimate.vector import Vector, sensitivities
 
 RIPPLE, INERTIA = "motor_torque_ripple", "drive.inertia.motor_kg_m2"
 
@@ -82,6 +83,27 @@ def test_a_fit_short_of_its_end_is_carried_on_and_one_at_its_end_is_not(fitted, 
     assert len(calls) == 1
     assert as_far_as_promised(bench, with_ripple) is with_ripple
     assert len(calls) == 1
+
+
+def test_delays_are_fitted_from_the_sensitivities_that_are_there(fitted, with_ripple, monkeypatch):
+    bench, _ = fitted
+    found, calls = sharpened(bench, with_ripple), []
+
+    def asked(*args, **options):
+        calls.append((args, options))
+        return fit(*args, **options)
+
+    monkeypatch.setattr(refitting, "fit", asked)
+    late = with_delays(bench, found, rough=True)
+    (((_, state, frees), options),) = calls
+    vector = Vector(state, tuple(frees), 0)
+    made = sensitivities(bench, vector, vector.start(), found.predictions)
+    known, _ = options["known"]
+    assert [free.delay_of for free in frees if free.delay_of] == ["motor_torque"]
+    assert known.shape == made.shape
+    size = np.linalg.norm(made, axis=0)
+    np.testing.assert_allclose(np.linalg.norm(known - made, axis=0) / size, 0.0, atol=0.05)
+    assert bench.power(late.predictions) <= bench.power(found.predictions)
 
 
 class Powers:

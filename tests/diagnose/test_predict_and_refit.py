@@ -137,16 +137,6 @@ def test_a_torque_that_is_stamped_late_or_early_does_not_bend_the_friction(tmp_p
     )
 
 
-def test_a_delay_is_fitted_from_what_a_fit_knows(tmp_path):
-    bench = Bench(predictors([rigid_record(8.0, noise=5e-4)], -100.0))
-    found = refit(bench, state_of(scenario(tmp_path))).fit
-    simulated = len(bench.predictors[0].steps)
-    late = with_delays(bench, found, rough=True)
-    # How a channel is read needs no simulation, and the other numbers' sensitivities are there.
-    assert len(bench.predictors[0].steps) - simulated < len(found.frees)
-    assert bench.power(late.predictions) <= bench.power(found.predictions)
-
-
 def test_a_delay_that_the_data_do_not_bound_is_not_told(tmp_path):
     bench = Bench(predictors([rigid_record(8.0, noise=5e-4)], -100.0))
     late, nan = {"delay_of": "motor_torque"}, math.nan
