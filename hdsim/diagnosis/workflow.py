@@ -52,6 +52,7 @@ from hdsim.estimate.prove import gaps, unseen
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, align, refit
 from hdsim.estimate.repeat import with_repeats
+from hdsim.estimate.resolved import told_of_damping
 from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.state import State, state_of
 from hdsim.estimate.suspect import delays, moving_zeros, one_way, suspicions
@@ -258,7 +259,8 @@ def _diagnosed(
         problems.append(told_of_end(bench, len(found.stages) - 1))
     intervals = base_intervals(current, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
-    problems += delays(bench, intervals)
+    intervals, blurred = told_of_damping(bench, current.state, intervals)
+    problems += [*delays(bench, intervals), *blurred]
     off = [i for i in intervals if i.moved]
     if decision.kind == "parameter":
         off = wrong_numbers(bench, base.before, current, intervals)

@@ -27,6 +27,7 @@ from hdsim.estimate.prove import gaps
 from hdsim.estimate.records import Array, Record
 from hdsim.estimate.refit import Refit, refit
 from hdsim.estimate.repeat import with_repeats
+from hdsim.estimate.resolved import told_of_damping
 from hdsim.estimate.short_cut import short_cut_of
 from hdsim.estimate.solution import Direction, correlations, directions
 from hdsim.estimate.state import State, state_of
@@ -178,7 +179,8 @@ def estimate(
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
     problems += [*beginnings(bench), *one_way(bench), *moving_zeros(bench, found.fit.predictions)]
-    problems += unsettled(bench, found.fit)
+    found.intervals, blurred = told_of_damping(bench, found.fit.state, found.intervals)
+    problems += [*unsettled(bench, found.fit), *blurred]
     own = found.fit.frees
     covariance, names = found.fit.covariance[: len(own), : len(own)], [each.name for each in own]
     matrix = correlations(covariance)

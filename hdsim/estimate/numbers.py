@@ -92,7 +92,11 @@ class Free:
 
 @dataclass
 class Interval:
-    """A fitted number with its 95 % interval; ``determined`` is false when the data cannot say."""
+    """A fitted number with its 95 % interval; ``determined`` is false when the data cannot say.
+
+    Where the measured motion does not resolve what would tell it, it is not ``resolved``: fitted, it makes up
+    for that, and says nothing of the drive (``hdsim.estimate.resolved``).
+    """
 
     name: str
     value: float
@@ -103,6 +107,7 @@ class Interval:
     determined: bool = True
     tied_to: list[str] = field(default_factory=list)
     delay_of: str = ""
+    resolved: bool = True
 
     @property
     def moved(self) -> bool:

@@ -57,7 +57,8 @@ def tie(bench: Bench, before: Sequence[Array], found: Fit, intervals: Sequence[I
         bench: the measured series.
         before: predictions of the model as given.
         found: the fit.
-        intervals: its numbers; those that are found are marked as tied.
+        intervals: its numbers; those that are found are marked as tied. None that is not ``resolved`` is one:
+            what that does is done for what the measured motion lacks.
     """
     columns, frees = found.columns[:, : len(found.frees)], list(found.frees)
     if found.beside is not None:
@@ -69,7 +70,7 @@ def tie(bench: Bench, before: Sequence[Array], found: Fit, intervals: Sequence[I
     power = along**2 / np.maximum((columns**2).sum(axis=0), 1e-300)
     by_name = {interval.name: interval for interval in intervals}
     order = [int(k) for k in np.argsort(-power) if power[k] >= ALONE * power.max()]
-    tied = [by_name[frees[k].name] for k in order]
+    tied = [one for one in (by_name[frees[k].name] for k in order) if one.resolved]
     for one in tied:
         one.tied_to = [other.name for other in tied if other is not one]
     return tied

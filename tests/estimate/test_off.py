@@ -1,5 +1,6 @@
 """Which numbers are said to be wrong: those that explain what a re-fit did, not what is off by chance."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,3 +53,10 @@ def test_most_is_more_than_all_others(part):
     numbers = [interval(LOSS, 1.01, 1.2), interval(GAIN, 0.5, 1.5)]
     off, sure = said({LOSS: np.sqrt(part), GAIN: np.sqrt(1.0 - part)}, numbers)
     assert (off, sure) == (([LOSS], True) if part > 0.5 else ([GAIN], False))
+
+
+def test_a_number_that_makes_up_for_what_the_motion_lacks_is_not_the_wrong_one():
+    made_up = replace(interval(LOSS, np.nan, np.nan, determined=False), resolved=False)
+    assert said({LOSS: 0.1}, [made_up])[0] == []
+    off, sure = said({LOSS: 0.1, GAIN: 0.095}, [made_up, interval(GAIN, 0.9, 1.3)])
+    assert (off, sure) == ([GAIN], False)
