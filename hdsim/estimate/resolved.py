@@ -3,8 +3,8 @@
 Of a sine of frequency f the cubic spline through samples, or knots, that are h apart keeps the part
 sinc(f h)^4 / sum_k sinc(f h - k)^4 (M. Unser 1999, *Splines: a perfect fit for signal and image processing*,
 IEEE Signal Processing Magazine 16(6):22). What it loses at the resonance of the load on the drive's spring
-drives the model no more, and a fit makes up for that by damping: 13.1 for 5.1 N m s/rad with 3.4 knots a
-period, 5.2 with 7.9 (seed drive, a chirp; calibrated on no other).
+drives the model no more, and a fit makes up for that by damping: 13.1 for 5.1 N m s/rad with 2.5 knots a
+period, 9.4 with 3.1, 5.2 with 6.0 (seed drive, a chirp).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from hdsim.estimate.predict import Predictor
 from hdsim.estimate.state import State
 
 DAMPING = "drive.torsion.damping_nm_s_per_rad"
-#: Part of what damping does at resonance, twice its ratio, that the motion may lose there: an interval of a
-#: damping is seldom narrower.
+#: Part of what damping does at resonance, twice its ratio, that the motion may lose there (chosen: an
+#: interval of a damping is seldom narrower; on that chirp it lies between 3.1 and 6.0 knots a period).
 SMALL = 0.1
 #: Neighbouring spectra that alias.
 ALIASES = np.arange(-8, 9)
