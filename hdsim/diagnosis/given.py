@@ -18,14 +18,13 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, strain
 from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import REACHED, unlikelihood
+from hdsim.estimate.standstill import CLEARLY
 
 if TYPE_CHECKING:
     from hdsim.diagnosis.search import Stage
 
-#: Squared prior spreads by which a base may be bent without another explanation being clearly likelier: twice
-#: a log-likelihood of 5, "very strong" (Kass and Raftery 1995, Journal of the American Statistical
-#: Association 90:773).
-AT_STAKE = 10.0
+#: Squared prior spreads by which a base may be bent without another explanation being clearly likelier.
+AT_STAKE = 2.0 * CLEARLY
 
 
 def is_all(bench: Bench, found: Fit) -> bool:

@@ -193,7 +193,11 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     if not found.named and not is_all(bench, current):
         screening = stage.screening
         other = over_the_given(bench, found.fit, frozenset(), math.inf, stage, named, during)
-        if other is not None and other is not named and _matters(bench, base, found, stage, other, False):
+        if (
+            other is not None
+            and other is not named
+            and _matters(bench, base, found, stage, other, found.left)
+        ):
             its = _finished(bench, base, found, other, during)
             if unlikelihood(bench, its, its) < unlikelihood(bench, current, its):
                 named, current, screening = other, its, stage.screening
@@ -274,20 +278,31 @@ def _one_more(
     coordinate = places[0].coordinate if places else ""
     named = name_effect(bench, current, screening, left, coordinate=coordinate, on_step=tell, fitted=fitted)
     known_power = bench.power(current.predictions if named is None else named.fit.predictions)
+    matters = partial(_matters, bench, base, found, stage, left=left, beyond=beyond)
     if found.named:
         # Beside the effects that are there a linear fit has to come near what is known already.
         enough, ask = LINEAR * known_power, known_power > FAR_LEFT_IN * bench.noise_power
+    elif named is not None and matters(named):
+        return named
     else:
-        enough, ask = math.inf, named is None or not _matters(bench, base, found, stage, named, beyond)
+        enough, ask = math.inf, True
     if ask:
         named = over_the_given(bench, current, instead(found.named), enough, stage, named, during)
-    return named if named is not None and _matters(bench, base, found, stage, named, beyond) else None
+    return named if named is not None and matters(named) else None
 
 
-def _matters(bench: Bench, base: Fit, found: Search, stage: Stage, named: Named, beyond: bool) -> bool:
-    """Whether an effect explains enough of what is missing, and more than other flanks; sets how much."""
+def _matters(
+    bench: Bench,
+    base: Fit,
+    found: Search,
+    stage: Stage,
+    named: Named,
+    left: Residual,
+    *,
+    beyond: bool = False,
+) -> bool:
+    """Whether an effect explains enough of what is ``left``, and more than other flanks; sets how much."""
     current = found.fit
-    left = beyond_curves(bench, current, found.left) if beyond else found.left
     change = left.project(bench.trace(current.predictions, named.fit.predictions))
     seen = {} if found.named or stage.screening is None else stage.screening.seen
     traces = None if found.named else [columns for _, columns in seen.values()]
