@@ -31,7 +31,8 @@ from rich.table import Table
 from hdsim.drive.model import Model
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.plan import plan_for
-from hdsim.estimate.predict import COARSE_RTOL, LEAD_IN_S, RTOL, Candidate, Predictor
+from hdsim.estimate.predict import COARSE_RTOL, RTOL, Candidate, Predictor
+from hdsim.estimate.prescribed import LEAD_IN_S
 from hdsim.estimate.records import Record
 from hdsim.estimate.short_cut import short_cut_of, whole_models
 from hdsim.estimate.state import state_of

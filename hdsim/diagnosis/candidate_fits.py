@@ -139,7 +139,7 @@ def _slopes(
         return np.zeros((len(bench.stacked_blocks()), 0))
     there = scaled(state, frees, [theta[free.name] for free in frees])
     vector = Vector(there, tuple(asked), len(there.added))
-    return sensitivities(bench, vector, vector.start())
+    return sensitivities(bench, vector, vector.start(), tangents=True)
 
 
 def linear_fit(base: Fit, point: Point, added: Added, columns: Array, power: float) -> tuple[Array, Array]:

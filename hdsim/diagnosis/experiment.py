@@ -21,7 +21,7 @@ from hdsim.diagnosis.separation import noise_of, separated
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit
-from hdsim.estimate.predict import LEAD_IN_S
+from hdsim.estimate.prescribed import LEAD_IN_S
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
 from hdsim.estimate.vector import Vector

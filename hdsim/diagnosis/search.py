@@ -35,6 +35,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
 from hdsim.estimate.refit import align, as_far_as_promised, reweigh, together, unlikelihood, with_delays
+from hdsim.estimate.series import Counted
 from hdsim.estimate.short_cut import follow_teeth
 
 #: Part of what a channel lacked at first that a later effect must explain where a smooth curve over the
@@ -71,7 +72,7 @@ class Search:
     named: list[Named] = field(default_factory=list)
     better: Fit | None = None
     thorough: bool = False
-    earlier: Fit | None = None
+    earlier: Search | None = None
     ended: bool = False
     anew: bool = False
 
@@ -82,7 +83,7 @@ def search(
     during: Callable[[str, str], Step],
     *,
     thorough: bool = False,
-    earlier: Fit | None = None,
+    earlier: Search | None = None,
 ) -> Search:
     """Add effects until nothing significant is left.
 
@@ -91,16 +92,18 @@ def search(
         base: the re-fitted model.
         during: told the step that begins and what it does; returns who is told the details.
         thorough: look for further effects whatever it takes (``hdsim.diagnosis.effort``).
-        earlier: the last fit of a search after which all began anew.
+        earlier: a search after which all began anew.
     """
     found, last = Search(base, left_of(bench, base), thorough=thorough, earlier=earlier), base
     while True:
-        if found.named and (hear_swing(bench, found.fit) or hear_rest(bench, last, found.fit)):
+        if found.named and _heard(bench, last, found.fit):
             found.anew = True
             return found
         following = _next(bench, base, found, during)
         if following is not None:
             last, found.fit = found.fit, following
+            if found.anew:
+                return found
             follow_teeth(bench, base.state, following.state)
             continue
         late = with_delays(bench, found.fit, rough=True)
@@ -176,9 +179,11 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     found.ended = more and not found.thorough and enough_done(bench, len(found.stages) - 1)
     if found.ended or not more:
         return None
-    fitted: Fitted = {} if found.named else from_where_it_was(bench, base, found.earlier)
+    fitted: Fitted = {}
+    if not found.named and found.earlier is not None:
+        fitted = from_where_it_was(bench, base, found.earlier.fit)
     if fitted:
-        stage.over_given = []  # that has been asked before
+        stage.over_given = []  # it begins beside a base that is not bent
     named = _one_more(bench, base, current, found, stage, bool(found.named), during, fitted)
     if found.named and (named is None or named.of_left < MOST):
         within = _one_more(bench, base, current, found, stage, False, during, fitted)
@@ -191,6 +196,9 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     current = _finished(bench, base, found, named, during)
     if not found.named and not is_all(bench, current):
+        if _heard(bench, found.fit, current):
+            found.anew = True
+            return current
         screening = stage.screening
         other = over_the_given(bench, found.fit, frozenset(), math.inf, stage, named, during)
         if (
@@ -221,6 +229,17 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
             found.named[:] = known
             return None
     return current
+
+
+def _heard(bench: Bench, before: Fit, found: Fit) -> bool:
+    """Whether the effect found last has shown samples that do not count, or a shaft that sticks."""
+    counted = Counted(bench.series)
+    # What it explained no longer counts as noise.
+    bench.weigh(bench.residuals(found.predictions))
+    heard = hear_swing(bench, found) or hear_rest(bench, before, found)
+    if not heard:
+        counted.weigh_as_before()
+    return heard
 
 
 def _finished(
@@ -260,6 +279,8 @@ def _one_more(
     if stage.screening is None:
         tell = during("screen", "screening the catalogue")
         first = found.stages[0].screening
+        if first is None and found.earlier is not None:
+            first = found.earlier.stages[0].screening
         beaten = instead(found.named)
         lines = stage.location.lines
         screening = screen(

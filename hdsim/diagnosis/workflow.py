@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from hdsim.diagnosis.base import on_few_readings, refitted
 from hdsim.diagnosis.collect import collect
 from hdsim.diagnosis.curve import CurveFit, fit_curve, proved
 from hdsim.diagnosis.decide import Decision, Reason, decide, reasons_of
@@ -32,7 +33,6 @@ from hdsim.diagnosis.sentences import (
 )
 from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.verdict import Verdict
-from hdsim.errors import InputError
 from hdsim.estimate.asked import asked_for
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
@@ -47,10 +47,9 @@ from hdsim.estimate.offsets import Zeros
 from hdsim.estimate.one_thread import one_blas_thread
 from hdsim.estimate.opening import bench_for, checked, locked_side
 from hdsim.estimate.plan import LoadSource
-from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.prove import gaps, unseen
 from hdsim.estimate.records import Array, Record
-from hdsim.estimate.refit import Refit, align, refit
+from hdsim.estimate.refit import Refit, align
 from hdsim.estimate.repeat import with_repeats
 from hdsim.estimate.resolved import told_of_damping
 from hdsim.estimate.short_cut import short_cut_of
@@ -164,14 +163,14 @@ def _diagnosed(
         readings = readings_of_means([*records, *held], **means)
         bench = bench_for(records, held, scenario, load, readings=readings, zeros=zeros)
     with step("refit", "re-fitting the parameters of the model"):
-        base = _refitted(bench, start)
-        left = bench.beyond_noise(base.fit.predictions)
-        fewer = readings_of_means([*records, *held], **means, left=left)
-        if fewer > readings:
-            # What is missing is so much that slower readings show it as well.
-            readings = fewer
-            bench = bench_for(records, held, scenario, load, readings=readings, zeros=zeros)
-            base = _refitted(bench, start)
+        # Where what is missing is much, slower readings show it as well.
+        bench, base, readings = on_few_readings(
+            bench,
+            start,
+            readings,
+            lambda left: readings_of_means([*records, *held], **means, left=left),
+            lambda count: bench_for(records, held, scenario, load, readings=count, zeros=zeros),
+        )
 
     running = contextlib.ExitStack()
 
@@ -181,15 +180,15 @@ def _diagnosed(
         return tell
 
     jumps: list[Jump] = []
-    earlier: Fit | None = None
+    earlier: Search | None = None
     with running:
         while True:
             found = search(bench, base.fit, during, thorough=thorough, earlier=earlier)
             if found.anew:
                 # The first effects have shown samples that do not count.
-                earlier = found.fit
+                earlier = found
                 during("refit", "re-fitting the parameters of the model")
-                base = _refitted(bench, start)
+                base = refitted(bench, start)
             elif found.better is not None:
                 # The effect has only shown the base's own numbers a better minimum.
                 own = base_intervals(found.better, base.freedoms)
@@ -198,7 +197,7 @@ def _diagnosed(
                 # All that a model leaves: it bends the base, and hides what is smaller.
                 jumps += back
                 during("refit", "re-fitting the parameters of the model")
-                base = _refitted(bench, start)
+                base = refitted(bench, start)
             else:
                 break
     # Its own numbers are those that effects have asked for, too.
@@ -308,19 +307,6 @@ def _diagnosed(
     return Diagnosis(
         verdict, evidence, checks, bench, base, found.stages, named, current, start, predictions, also
     )
-
-
-def _refitted(bench: Bench, start: State) -> Refit:
-    """The model with its own numbers fitted.
-
-    Raises:
-        InputError: it cannot follow the motion.
-    """
-    try:
-        return refit(bench, start)
-    except PredictionError as error:
-        names = ", ".join(p.record.name for p in bench.predictors[: bench.training])
-        raise InputError(f"{names}: the model cannot follow the measured motion: {error}") from None
 
 
 @dataclass

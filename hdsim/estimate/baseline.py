@@ -28,7 +28,8 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.found import Gap
 from hdsim.estimate.offsets import groups
 from hdsim.estimate.orders import order_lines
-from hdsim.estimate.predict import LEAD_IN_S, Predictor
+from hdsim.estimate.predict import Predictor
+from hdsim.estimate.prescribed import LEAD_IN_S
 from hdsim.estimate.prove import held_out_gap
 from hdsim.estimate.records import Array
 from hdsim.estimate.series import Series

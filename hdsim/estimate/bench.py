@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hdsim.errors import InputError
 from hdsim.estimate.covariance import sample_power
+from hdsim.estimate.covered import covered
 from hdsim.estimate.offsets import Zeros, offset_columns, offsets_of
 from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.estimate.records import Array, Mask
@@ -128,43 +129,8 @@ class Bench:
         return self.stacked([change - zero for change, zero in zip(changes, shifts, strict=True)])
 
     def ranges(self, state: State) -> dict[str, float]:
-        """What the training records cover, by the names that fittings use.
-
-        ``twist_arcmin`` (between 1 % quantiles) where they tell it; ``torque_nm`` and
-        ``motor_side_torque_nm``, the largest torque at the output, measured or as the motor's, else the one
-        where the drive's third stiffness begins. Of a mesh with teeth the angle between two of each spline,
-        ``flexspline_pitch_deg`` and ``circular_spline_pitch_deg``.
-
-        Args:
-            state: the model.
-        """
-        found = self._twists()
-        largest = 0.0
-        for predictor in self.predictors[: self.training]:
-            for channel, factor in (("output_torque", 1.0), ("motor_torque", abs(predictor.ratio))):
-                if channel in predictor.record.channels and predictor.record.trusted[channel].any():
-                    values = np.abs(predictor.record.filled(channel))
-                    largest = max(largest, factor * float(np.quantile(values, 0.99)))
-                    break
-        largest = largest or state.drive.torsion.torque_t2_nm
-        if state.toothed:
-            geometry = state.drive.geometry
-            found["flexspline_pitch_deg"] = 360.0 / geometry.flexspline_teeth
-            found["circular_spline_pitch_deg"] = 360.0 / geometry.circular_spline_teeth
-        return found | {"torque_nm": largest, "motor_side_torque_nm": largest / abs(self.predictors[0].ratio)}
-
-    def _twists(self) -> dict[str, float]:
-        widest = 0.0
-        for predictor in self.predictors[: self.training]:
-            twist = predictor.motor_angle / predictor.ratio
-            record = predictor.record
-            if not predictor.plan.locked:
-                if predictor.plan.motion != "motor_angle" or "output_angle" not in record.channels:
-                    continue
-                twist = twist - record.filled("output_angle")
-            low, high = np.quantile(twist, [0.01, 0.99])
-            widest = max(widest, float(np.degrees(high - low)) * 60.0)
-        return {"twist_arcmin": widest} if widest > 0 else {}
+        """What the training records cover, by the names that fittings use (``covered``)."""
+        return covered(self.predictors[: self.training], state)
 
     def predict(self, state: State, *, everything: bool = False) -> list[Array]:
         """What the log would show of all series; of records that are held out only when ``everything``.
@@ -178,10 +144,13 @@ class Bench:
         """
         reach = len(self.predictors) if everything else self.training
         candidate = state.candidate()
-        found: list[Mapping[str, Array]] = [p.predict(candidate) for p in self.predictors[:reach]]
+        return self._series(state, [p.predict(candidate) for p in self.predictors[:reach]])
+
+    def _series(self, state: State, found: Sequence[Mapping[str, Array]]) -> list[Array]:
+        """What the log would show of all series, of the channels of the first records."""
         return [
             state.reading(s.channel, self.time_of(s), found[s.record][s.channel])
-            if s.record < reach
+            if s.record < len(found)
             else np.zeros(0)
             for s in self.series
         ]
@@ -227,6 +196,33 @@ class Bench:
                 return None
 
         return in_order(one, states)
+
+    def beside(self, state: State, others: Sequence[State]) -> list[tuple[list[Array], list[Array]] | None]:
+        """Predictions of the training records for a model and for each of others next to it.
+
+        Args:
+            state: the model.
+            others: models that differ so little that they may be linearised beside it.
+
+        Returns:
+            What ``predict`` returns of both; None where the other one is made of other parts.
+        """
+        from hdsim.simulation.ensemble import in_order
+
+        candidate, near = state.candidate(), [other.candidate() for other in others]
+        try:
+            found = in_order(lambda p: p.beside(candidate, near), self.predictors[: self.training])
+        except PredictionError:
+            return [None] * len(others)
+        return [
+            None
+            if any(pair is None for pair in pairs)
+            else (
+                self._series(state, [pair[0] for pair in pairs]),
+                self._series(other, [pair[1] for pair in pairs]),
+            )
+            for other, pairs in zip(others, zip(*found, strict=True), strict=True)
+        ]
 
     def sample_power(self, rest: Array) -> float:
         """What one independent sample of a stacked residual, shape (rows,), counts."""

@@ -124,7 +124,7 @@ def fit(
     power = known[1] if known is not None else math.nan
     if prune and chosen:
         whole = Measured(bench, Vector(state, tuple(chosen), held_effects), theta)
-        columns = whole.sensitivities(whole.start)
+        columns = whole.sensitivities(whole.start, tangents=rough)
         asked = len(chosen) - sure
         rest = whole.residual(whole.start)
         split = determined(columns, rest, whole.priors, whole.blocks, asked, len(chosen))
@@ -218,7 +218,8 @@ def settled(bench: Bench, found: Fit) -> Fit:
 def sharpened(bench: Bench, found: Fit) -> Fit:
     """A rough fit with the sensitivities made anew where it ended."""
     vector = Vector(found.state, tuple(at_present(found)), 0)
-    return replace(found, columns=sensitivities(bench, vector, vector.start(), found.predictions))
+    columns = sensitivities(bench, vector, vector.start(), found.predictions, tangents=True)
+    return replace(found, columns=columns)
 
 
 def at_present(found: Fit) -> list[Free]:

@@ -1,56 +1,42 @@
 """Step 2a, predict: the model under the measured motion and the known load, channel by channel.
 
-The motion is prescribed, so an unstable or unknown controller does not matter and nothing drifts away.
-With both encoders the motor's motion is prescribed, output motion and torques are predicted. Without the
-motor's encoder the output's motion times the ratio stands for it, and torques are predicted. Where the
-reading of the output's torque sensor is the load, all of the scenario's load is in it, and the sensor is
-compared with its slow part: its ripple is faster than a load that is carried. A measured temperature is given
-to the parts that follow it, smoothed as the load.
+With both encoders the motor's motion is prescribed (``hdsim.estimate.prescribed``), output motion and torques
+are predicted; without the motor's encoder torques are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from copy import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdsim.drive.parameters import RESOLVED_RAD_PER_S
 from hdsim.errors import PhysicsError
-from hdsim.estimate.known_load import MeasuredLoad, arm_course, beside_readings
+from hdsim.estimate.known_load import beside_readings
 from hdsim.estimate.lead_in import LeadInDamper
-from hdsim.estimate.noise import (
-    noise_of_means,
-    quantisation_step,
-    step_of,
-    step_of_means,
-    usual_size,
-    without_orders,
-)
+from hdsim.estimate.noise import noise_of_means, quantisation_step, step_of, without_orders
 from hdsim.estimate.plan import LoadSource, Locked, Plan, plan_for
+from hdsim.estimate.prescribed import LEAD_IN_S, Prescribed
 from hdsim.estimate.records import Array, Mask, Record
-from hdsim.estimate.spline import SlowPart, drawn_anew, pieces_of, signal, smoothed, spline_through
-from hdsim.estimate.thin import Means
-from hdsim.estimate.true_motion import Sines, errors_of, true_motion
-from hdsim.estimate.unloaded import unloaded_angle
-from hdsim.estimate.zeros import Zero, between_zeros
+from hdsim.estimate.spline import signal
+from hdsim.estimate.true_motion import errors_of, true_motion
+from hdsim.estimate.zeros import Zero
 
 if TYPE_CHECKING:
     from hdsim.actuation.arm import Arm
     from hdsim.actuation.signal_data import SignalData
+    from hdsim.drive.model import Model
     from hdsim.drive.parameters import Drive
     from hdsim.parts import Effect
 
-#: Time for which the model runs before the record begins, so that its own oscillation has died away, s.
-LEAD_IN_S = 0.5
 #: Relative tolerance of predictions: tight against the steps of finite differences, for an integrator's
 #: noise in a Jacobian looks like information; and the tolerance of a search, whose steps are larger.
 RTOL, COARSE_RTOL = 1e-6, 3e-5
 #: How much more closely the whole model of a drive with teeth follows its ring (``Model.seen_scale``).
 CLOSER = 10.0
+#: Predicted channels of a model and of one beside it, shape (n,) each.
+Change = tuple[dict[str, Array], dict[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -63,16 +49,16 @@ class Candidate:
     seed: int = 0
 
 
-class Predictor:
+class Predictor(Prescribed):
     """Predicts the channels of one record for any candidate model.
 
     Args:
         record: the measured run.
         plan: what is prescribed and predicted.
         ratio: the model's signed ratio.
-        arm: what the drive's joint carries, where that is a robot arm; its numbers are each candidate's own.
+        arm: see ``Prescribed``.
         rtol: relative tolerance of the integration.
-        apart_s: least time between the knots of a motion that no measured rate speaks for, s.
+        apart_s: see ``Prescribed``.
     """
 
     def __init__(
@@ -84,130 +70,12 @@ class Predictor:
         rtol: float = RTOL,
         apart_s: float = 0.0,
     ) -> None:
-        self.record, self.plan, self.rtol = record, plan, rtol
-        turns, self._zero = 0, 0.0
-        if plan.motion == "motor_angle" and "output_angle" in record.readable and not plan.locked:
-            turns, self._zero = between_zeros(record, ratio)
-        self._means = Means(record)
-        #: The prescribed reading, shape (n,), counted from the motor's zero that is next to the output's.
-        values = self._reading = self._means.behind(record.filled(plan.motion)) + 2.0 * np.pi * turns
-        # Ramps against a locked output creep: they reverse without a jump that could be seen.
-        moves, step, rate = not plan.locked, self._step(plan.motion), record.rate(plan.motion)
-        #: Samples (n,) that hold a reading of the motion, and the record's ends: the spline's.
-        self._read = record.trusted[plan.motion].copy()
-        self._read[[0, -1]] = True
-        time, read = record.time[self._read], values[self._read]
-        rate = None if rate is None else (self._means.behind(rate[0])[self._read], rate[1][self._read])
-        through = spline_through(time, read, motion=moves, step=step, rate=rate, apart_s=apart_s)
-        self._spline, self.likeliest = through
-        values[~self._read] = self._spline(record.time[~self._read])
-        breaks, coefficients = pieces_of(self._spline)
-        #: Motor angle for the measured motion: with the motor locked, as it turns beside the output.
-        self._factor = 1.0 if plan.motion == "motor_angle" else -ratio if plan.locked else ratio
-        coefficients = coefficients * self._factor
-        if plan.locked:
-            # The encoder's zero means nothing there: the drive is unwound where it carries no torque.
-            coefficients[0] -= unloaded_angle(record, self._factor * values)
-        self._breaks, self._coefficients = breaks, coefficients
-        self.turn(0.0)
-        #: Motor speed over which a sticking drive's sign of friction is smoothed, rad/s.
-        self.smoothing = RESOLVED_RAD_PER_S
-        self._load: MeasuredLoad | None = None
-        if plan.load != "scenario":
-            carried = self._means.behind(record.filled(plan.load))
-            sign = -1.0 if plan.load == "output_torque" else 1.0
-            self._load = MeasuredLoad(record.time, sign * carried, self._step(plan.load))
-        self.load_torque = None if self._load is None else self._load.signal(LEAD_IN_S)
-        #: What a part may ask for beside the motion (``Builder.external``).
-        self.signals: dict[str, SignalData] = {}
-        if "temperature" in record.readable:
-            found = smoothed(record.time, record.filled("temperature"))
-            self.signals["temperature"] = signal(*found, LEAD_IN_S, steady=True)
-        #: The part of a channel that a slow load could be, where the torque sensor's reading is the load.
-        self.slow: SlowPart | None = None
-        if plan.load == "output_torque":
-            factor = ratio if plan.motion == "output_angle" else 1.0
-            self.slow = SlowPart(record.time, factor * values / (2 * np.pi))
-            #: What the sensor that is the load is compared with, shape (n,).
-            self.slow_torque = self.slow.of(record.filled("output_torque"))
-        #: Of an arm; a torque sensor that is the load has it in its reading.
-        self._arm = arm if plan.load != "output_torque" else None
-        self.course = None if self._arm is None else arm_course(record, self._arm)
-        self.ratio = ratio
+        super().__init__(record, plan, ratio, arm, apart_s)
+        self.rtol = rtol
         self.steps: list[int] = []  # of the integration, of each prediction but of whole models
         #: Of drives with teeth (``hdsim.estimate.short_cut``): no short cut; whose teeth are in a table.
         self.whole = False
         self.table_for: frozenset[str] | None = None
-
-    def turn(self, angle: float) -> None:
-        """Turn the prescribed motion: only where a side is locked does its zero mean anything.
-
-        Args:
-            angle: added to the motor's angle, rad.
-        """
-        self._coefficients = self._coefficients.copy()
-        self._coefficients[0] += angle
-        self.motion = signal(self._breaks, self._coefficients, LEAD_IN_S)
-        #: The last motion without an encoder's errors, by these.
-        self._true: dict[Sines, SignalData] = {}
-        motion = self.motion.values(self.record.time + LEAD_IN_S)
-        #: Motor angle, velocity and acceleration as prescribed, shape (n,) each.
-        self.motor_angle, self.motor_velocity, self.motor_acceleration = motion[0], motion[1], motion[2]
-
-    def disturbed(self, seed: int = 0) -> Predictor:
-        """The same record as another reading would have given motion and load (parametric bootstrap).
-
-        What a prediction changes by is what the noise of the motion, of an arm's other joints and of the load
-        does to it.
-
-        Args:
-            seed: of the draw.
-        """
-        rng = np.random.default_rng([seed, 11])
-        found = self._moved(rng)
-        if self._arm is not None:
-            found.course = arm_course(self.record, self._arm, rng)
-        if self._load is not None:
-            found.load_torque = self._load.signal(LEAD_IN_S, rng)
-        return found
-
-    @cached_property
-    def speed_noise(self) -> float:
-        """Standard deviation of what the motion's noise does to the motor's speed as a rule, rad/s."""
-        again = self._moved(np.random.default_rng([0, 11])).motor_velocity
-        # The median: a loop's hiccup is no noise of the sensor.
-        return usual_size(again - self.motor_velocity)
-
-    @property
-    def samples_a_knot(self) -> float:
-        """Samples between knots of the prescribed motion, on average."""
-        return np.count_nonzero(self._read) / len(self._spline.c)
-
-    @property
-    def angle_noise(self) -> float:
-        """What readings of the prescribed motion differ by from it, root mean square, rad of the motor."""
-        apart = self._factor * self._reading - self.motor_angle
-        return float(np.std(apart[self._read]))
-
-    def _moved(self, rng: np.random.Generator) -> Predictor:
-        """The same record with the prescribed motion alone drawn anew."""
-        found = copy(self)
-        if self.likeliest is not None:
-            coefficients: Array | None = pieces_of(self.likeliest.disturbed(rng))[1]
-        else:
-            read = self._read
-            coefficients = drawn_anew(self.record.time[read], self._reading[read], self._spline, rng)
-        if coefficients is not None:
-            found._coefficients = self._factor * coefficients
-            found.turn(float(self.motor_angle[0] - self._factor * self._spline(self.record.time[0])))
-        return found
-
-    def _step(self, channel: str) -> float:
-        """Step of a channel's sensor, as it is felt in the record."""
-        raw, values = self.record.as_read, self.record.filled(channel)
-        good = raw.trusted[channel]
-        step = step_of(self.record, channel)
-        return step_of_means(raw.channels[channel], good, step, values, self.record.readings)
 
     def measured(self, channel: str) -> tuple[Array, Mask, float, float]:
         """What a predicted channel is compared with.
@@ -254,12 +122,76 @@ class Predictor:
         Raises:
             PredictionError: the model cannot be, or could not be integrated.
         """
+        asked = tuple(dict.fromkeys((*self.plan.channels, *also)))
+        (got,) = self._sampled([self._model(candidate)], asked)
+        return self._as_read(got) | {f"true_{name}": got[name] for name in also}
+
+    def beside(self, candidate: Candidate, others: Sequence[Candidate]) -> list[Change | None]:
+        """What a model predicts, and others that differ so little that they may be linearised beside it.
+
+        Args:
+            candidate: the model.
+            others: see ``hdsim.simulation.sample.samples_beside``; of other parts, they are none of these.
+
+        Returns:
+            Predicted channels of the model and of each other one; None where that is none.
+
+        Raises:
+            PredictionError: the model cannot be, or could not be integrated.
+        """
+        from hdsim.simulation.sample import alike
+
+        model = self._model(candidate)
+        end = float(self.record.time[-1]) + LEAD_IN_S
+        near: list[Model | None] = []
+        if not alike(model, model, end):
+            return [None] * len(others)  # nor to any other, whose tables would be made in vain
+        for other in others:
+            try:
+                one = self._model(other)
+            except PredictionError:
+                near.append(None)
+            else:
+                near.append(one if alike(model, one, end) else None)
+        if not any(near):
+            return [None] * len(near)
+        got, *there = self._sampled([model, *(one for one in near if one is not None)], self.plan.channels)
+        here, changed = self._as_read(got), iter(there)
+        return [None if one is None else (here, self._as_read(next(changed))) for one in near]
+
+    def _sampled(self, models: Sequence[Model], channels: Sequence[str]) -> list[dict[str, Array]]:
+        """Channels of a model, and of those that are linearised beside it, at the record's times."""
+        from hdsim.simulation.run import RunFailed
+        from hdsim.simulation.sample import samples_beside
+
+        model, *others = models
+        scale, steps = model.seen_scale(CLOSER if self.whole else 1.0), [] if self.whole else self.steps
+        times, rtol = self.record.time + LEAD_IN_S, self.rtol
+        try:
+            return samples_beside(model, others, times, channels, rtol=rtol, atol=rtol * scale, steps=steps)
+        except RunFailed as error:
+            raise PredictionError(str(error)) from None
+
+    def _as_read(self, got: Mapping[str, Array]) -> dict[str, Array]:
+        """The predicted channels of what was sampled, as the sensors read them."""
+        found = {c: self._means.of(got.get(f"measured_{c}", got[c])) for c in self.plan.channels}
+        if self.slow is not None and "output_torque" in found:
+            # What the sensor adds, and of that what a slow load could not be.
+            own = found["output_torque"] - self._means.of(got["output_torque"])
+            own = own - self.slow.of(own) if np.any(own) else own
+            found["output_torque"] = self.slow_torque + own
+        return found
+
+    def _model(self, candidate: Candidate) -> Model:
+        """A candidate under the record's motion and load.
+
+        Raises:
+            PredictionError: it cannot be.
+        """
         from hdsim.actuation.loads import SignalTorque
         from hdsim.actuation.shapes import Hold
         from hdsim.actuation.signal_data import SignalData
         from hdsim.drive.model import Model
-        from hdsim.simulation.run import RunFailed
-        from hdsim.simulation.sample import sample
 
         load = candidate.load
         weight, inertia = beside_readings(load, candidate.drive, sensed=self.slow is not None)
@@ -302,20 +234,7 @@ class Predictor:
             raise PredictionError(str(error)) from None
         for side in {"ring", "output"} & set(model.place_of):
             model.system.y0[model.place_of[side]] = self._zero
-        asked = tuple(dict.fromkeys((*self.plan.channels, *also)))
-        try:
-            rtol, scale = self.rtol, model.seen_scale(CLOSER if self.whole else 1.0)
-            times, steps = self.record.time + LEAD_IN_S, [] if self.whole else self.steps
-            got = sample(model, times, asked, rtol=rtol, atol=rtol * scale, steps=steps)
-        except RunFailed as error:
-            raise PredictionError(str(error)) from None
-        found = {c: self._means.of(got.get(f"measured_{c}", got[c])) for c in self.plan.channels}
-        if self.slow is not None and "output_torque" in found:
-            # What the sensor adds, and of that what a slow load could not be.
-            own = found["output_torque"] - self._means.of(got["output_torque"])
-            own = own - self.slow.of(own) if np.any(own) else own
-            found["output_torque"] = self.slow_torque + own
-        return found | {f"true_{name}": got[name] for name in also}
+        return model
 
     def _motion(self, candidate: Candidate) -> SignalData:
         """The motor's motion, without the error that the candidate knows of the encoder it was read from."""

@@ -59,5 +59,11 @@ class Simulated(Problem, Protocol):
     def changes(self, pairs: Sequence[tuple[Array, Array]]) -> list[Array | None]:
         """Residual at the first place of each pair less the one at the second; None where one is missing."""
 
-    def sensitivities(self, x: Array, first: int = 0, like: Array | None = None) -> Array:
-        """Derivatives of the residual, their sign turned, to the numbers from ``first`` on."""
+    def sensitivities(
+        self, x: Array, first: int = 0, like: Array | None = None, *, tangents: bool = False
+    ) -> Array:
+        """Derivatives of the residual, their sign turned, to the numbers from ``first`` on.
+
+        With ``tangents`` they are for a step of a fit, and may be cheaper than differences that are large
+        enough to be heard.
+        """

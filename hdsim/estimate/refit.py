@@ -72,10 +72,7 @@ def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Re
         state: the base model.
         frees: numbers that may move; all that the base has when None.
     """
-    locked = all(predictor.plan.locked for predictor in bench.predictors)
-    if frees is None:
-        frees = base_freedoms(state, bench.channels, load_known=bench.load_known, locked=locked)
-    freedoms = list(frees)
+    freedoms = _own_numbers(bench, state) if frees is None else list(frees)
     before, found = _roughly(bench, state, freedoms)
     # A vibration at the beginning bends a fit, and one that is less bent shows more of it.
     for _ in range(BEGINNINGS):
@@ -143,6 +140,21 @@ def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
         return found
     reweigh(bench, late)
     return late
+
+
+def first_look(bench: Bench, state: State) -> list[Array]:
+    """Predictions of the model after the first steps of a re-fit.
+
+    Raises:
+        PredictionError: the model as given could not be predicted.
+    """
+    return _roughly(bench, state, _own_numbers(bench, state))[1].predictions
+
+
+def _own_numbers(bench: Bench, state: State) -> list[Free]:
+    """All numbers that the base has."""
+    locked = all(predictor.plan.locked for predictor in bench.predictors)
+    return base_freedoms(state, bench.channels, load_known=bench.load_known, locked=locked)
 
 
 def _roughly(bench: Bench, state: State, freedoms: Sequence[Free]) -> tuple[list[Array], Fit]:

@@ -42,7 +42,7 @@ class Slopes:
 
     def exact(self, x: Array) -> Array:
         """Made at ``x``, shape (rows, p)."""
-        self._columns, self._at = made(self._problem, x, like=self._columns), x.copy()
+        self._columns, self._at = made(self._problem, x, like=self._columns, tangents=True), x.copy()
         return self._columns
 
     def proved(self, x: Array) -> Array:
@@ -50,8 +50,8 @@ class Slopes:
 
         What is left of columns that cancel is mostly their own error, which would be taken for knowledge.
         """
-        columns = self.exact(x)
-        problem = self._problem
+        columns, problem = made(self._problem, x, like=self._columns), self._problem
+        self._columns, self._at = columns, x.copy()
         if not isinstance(problem, Simulated):
             return columns
         lengths = np.linalg.norm(columns, axis=0)
@@ -81,7 +81,7 @@ class Slopes:
             return self.exact(x)
         if not len(self._at):
             # What was known counts where the fit begins.
-            rest = made(self._problem, x, self._columns.shape[1])
+            rest = made(self._problem, x, self._columns.shape[1], tangents=True)
             self._columns, self._at = np.hstack([self._columns, rest]), x.copy()
         step = x - self._at
         if not np.any(step):
@@ -103,7 +103,9 @@ class Slopes:
         return self._columns
 
 
-def made(problem: Problem, x: Array, first: int = 0, like: Array | None = None) -> Array:
+def made(
+    problem: Problem, x: Array, first: int = 0, like: Array | None = None, *, tangents: bool = False
+) -> Array:
     """Sensitivities at ``x`` to the numbers from ``first`` on, shape (rows, p - first).
 
     Args:
@@ -111,9 +113,10 @@ def made(problem: Problem, x: Array, first: int = 0, like: Array | None = None) 
         x: where.
         first: index of the first number that is asked for.
         like: sensitivities near ``x``, which tell a simulated problem how large its steps have to be.
+        tangents: see ``Simulated``.
     """
     if isinstance(problem, Simulated):
-        return problem.sensitivities(x, first, like)
+        return problem.sensitivities(x, first, like, tangents=tangents)
     if isinstance(problem, Differentiable):
         return -np.asarray(problem.jacobian(x), dtype=float)[:, first:]
     lower, upper = problem.bounds

@@ -15,7 +15,8 @@ from hdsim.drive.parameters import ToothedMesh
 from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
 from hdsim.effects.table import Table
-from hdsim.estimate.predict import LEAD_IN_S, Candidate, PredictionError
+from hdsim.estimate.predict import Candidate, PredictionError
+from hdsim.estimate.prescribed import LEAD_IN_S
 from hdsim.estimate.records import Array
 from hdsim.nested import copied, merge, put
 

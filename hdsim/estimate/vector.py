@@ -20,6 +20,8 @@ from hdsim.estimate.state import State
 STEP, SMALL_STEP, CHANGE, LEAST_STEP, MOST_STEP = 1e-1, 3e-2, 0.03, 3e-3, 10.0
 #: Part of the largest step below which the wanted one is asked for anew.
 BENT = 0.1
+#: Step of a derivative that is integrated beside the model: free of its noise, and so small that it is one.
+BESIDE = 1e-6
 #: Prior spreads of an effect's coefficients (in units of their terms) and of what a fit moves of its shapes.
 COEFFICIENT_PRIOR, SHAPE_PRIOR = 30.0, 1.5
 #: Farthest that a fit moves a shape from where it starts.
@@ -188,11 +190,12 @@ class Measured:
             for back, ahead in zip(there[::2], there[1::2], strict=True)
         ]
 
-    def sensitivities(self, x: Array, first: int = 0, like: Array | None = None) -> Array:
+    def sensitivities(
+        self, x: Array, first: int = 0, like: Array | None = None, *, tangents: bool = False
+    ) -> Array:
         """See ``sensitivities``."""
-        return sensitivities(
-            self.bench, self.vector, x, self.predictions.get(x.tobytes()), first=first, like=like
-        )
+        known = self.predictions.get(x.tobytes())
+        return sensitivities(self.bench, self.vector, x, known, first=first, like=like, tangents=tangents)
 
 
 def sensitivities(
@@ -203,8 +206,12 @@ def sensitivities(
     *,
     first: int = 0,
     like: Array | None = None,
+    tangents: bool = False,
 ) -> Array:
     """Derivatives of the whitened predictions, offsets removed, to the numbers from ``first`` on.
+
+    Secants say what the data tell of a number: they are as large as a change has to be to be heard, across
+    the corners that it moves. A step of a fit is as good by tangents, which are integrated beside the model.
 
     Args:
         bench: the measured series.
@@ -214,18 +221,24 @@ def sensitivities(
         first: index of the first number that is asked for.
         like: sensitivities near ``x``, shape (rows, up to p): steps are then large enough for a change that
             stands out from the solver's noise, and no larger.
+        tangents: take tangents to numbers that leave the model's parts as they are.
     """
     here = vector.state(x)
     if predictions is None:
         predictions = bench.predict(here)
-    steps = vector.steps(x)
+    steps, wanted = vector.steps(x), range(first, len(x))
+    known = _tangents(bench, vector, x, steps, wanted) if tangents else {}
     if like is not None:
         steps *= _shorter(like, steps, vector)
-    columns = _differences(bench, vector, x, predictions, steps, range(first, len(x)))
+    columns = np.zeros((len(bench.stacked_blocks()), len(wanted)))
+    for k, tangent in known.items():
+        columns[:, k - first] = tangent
+    others = [k for k in wanted if k not in known]
+    columns[:, [k - first for k in others]] = _differences(bench, vector, x, predictions, steps, others)
     if like is None:
         # Secants of changes that are far above the noise show the model's bend, not its slope.
         factors = _shorter(columns, steps[first:], vector, first)
-        bent = [k for k in range(first, len(x)) if factors[k - first] < BENT]
+        bent = [k for k in others if factors[k - first] < BENT]
         steps[bent] *= factors[[k - first for k in bent]]
         columns[:, [k - first for k in bent]] = _differences(bench, vector, x, predictions, steps, bent)
     return columns
@@ -251,7 +264,7 @@ def _differences(
     here = vector.state(x)
     states = [vector.state(x + steps[k] * (np.arange(len(x)) == k)) for k in wanted]
     # How a channel is read needs no simulation.
-    read = [k < len(vector.frees) and vector.frees[k].reading for k in wanted]
+    read = [_only_read(vector, k) for k in wanted]
     simulated = iter(bench.predict_all([s for s, only in zip(states, read, strict=True) if not only]))
     columns = np.zeros((len(bench.stacked_blocks()), len(states)))
     for at, (k, state, only) in enumerate(zip(wanted, states, read, strict=True)):
@@ -259,3 +272,30 @@ def _differences(
         if there is not None:
             columns[:, at] = bench.trace(predictions, there) / steps[k]
     return columns
+
+
+def _only_read(vector: Vector, k: int) -> bool:
+    return k < len(vector.frees) and vector.frees[k].reading
+
+
+def _tangents(
+    bench: Bench, vector: Vector, x: Array, steps: Array, wanted: Sequence[int]
+) -> dict[int, Array]:
+    """Whitened derivatives, integrated beside the model, to those numbers that leave its parts as they are.
+
+    How a channel is read needs no integration: those numbers are not among them.
+
+    Args:
+        bench: the measured series.
+        vector: the numbers.
+        x: where.
+        steps: of finite differences, shape (p,): a derivative is one-sided where the model is.
+        wanted: which numbers.
+    """
+    wanted = [k for k in wanted if not _only_read(vector, k)]
+    sizes = np.copysign(BESIDE * np.maximum(1.0, np.abs(x)), steps)
+    others = [vector.state(x + sizes[k] * (np.arange(len(x)) == k)) for k in wanted]
+    found = bench.beside(vector.state(x), others) if wanted else []
+    return {
+        k: bench.trace(*pair) / sizes[k] for k, pair in zip(wanted, found, strict=True) if pair is not None
+    }

@@ -79,7 +79,7 @@ class Cornered:
     def changes(self, pairs):
         return [self.predicted(ahead) - self.predicted(back) for back, ahead in pairs]
 
-    def sensitivities(self, x, first=0, like=None):
+    def sensitivities(self, x, first=0, like=None, *, tangents=False):
         return self.slopes[:, first:]
 
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import hdsim
 from hdsim.effects.sensors import Encoder, EncoderRipple, Sensors
 from hdsim.estimate.opening import bench_for
-from hdsim.estimate.predict import LEAD_IN_S
+from hdsim.estimate.prescribed import LEAD_IN_S
 from hdsim.estimate.records import Record
 from hdsim.estimate.state import state_of
 from hdsim.estimate.true_motion import errors_of, true_motion
