@@ -42,7 +42,7 @@ class Slopes:
 
     def exact(self, x: Array) -> Array:
         """Made at ``x``, shape (rows, p)."""
-        self._columns, self._at = made(self._problem, x, like=self._columns, tangents=True), x.copy()
+        self._columns, self._at = made(self._problem, x, like=self._columns, tangents=not self._thrifty), x.copy()
         return self._columns
 
     def proved(self, x: Array) -> Array:
@@ -81,7 +81,7 @@ class Slopes:
             return self.exact(x)
         if not len(self._at):
             # What was known counts where the fit begins.
-            rest = made(self._problem, x, self._columns.shape[1], tangents=True)
+            rest = made(self._problem, x, self._columns.shape[1], tangents=not self._thrifty)
             self._columns, self._at = np.hstack([self._columns, rest]), x.copy()
         step = x - self._at
         if not np.any(step):

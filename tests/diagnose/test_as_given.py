@@ -15,6 +15,7 @@ from hdsim.diagnosis.point import as_given
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import refit
+from hdsim.estimate.series import Counted
 from hdsim.estimate.state import number_at, state_of
 
 INERTIA = "drive.inertia.motor_kg_m2"
@@ -92,3 +93,34 @@ def test_a_first_effect_is_asked_for_over_the_given_only_where_one_over_the_fit_
     assert searching._next(bench, found, search, lambda *_: lambda _: None) is found
     assert search.named == [named]
     assert len(calls) == asked
+
+
+def test_what_no_longer_counts_beside_a_first_effect_is_heard_before_the_given_is_asked(fitted, monkeypatch):
+    bench, found = fitted
+    named = SimpleNamespace(name="motor_torque_ripple", fit=found, worth_finer=False)
+    asked: list[str] = []
+    sigmas: list[float] = []
+
+    def rests(bench, before, now):
+        assert before is now is found
+        sigmas.extend(series.sigma for series in bench.series)
+        return True
+
+    monkeypatch.setattr(searching, "_one_more", lambda *_: named)
+    monkeypatch.setattr(searching, "_finished", lambda *_: found)
+    monkeypatch.setattr(searching, "over_the_given", lambda *_: asked.append("given"))
+    monkeypatch.setattr(searching, "is_all", lambda *_: False)
+    monkeypatch.setattr(searching, "nothing_but_flanks", lambda *_: False)
+    monkeypatch.setattr(searching, "hear_swing", lambda *_: False)
+    monkeypatch.setattr(searching, "hear_rest", rests)
+    counted = Counted(bench.series)
+    for series in bench.series:
+        series.sigma *= 3.0
+    result = searching.search(bench, found, lambda *_: lambda _: None)
+    assert result.anew
+    assert result.fit is found
+    assert not asked
+    counted.weigh_as_before()
+    bench.weigh(bench.residuals(found.predictions))
+    assert sigmas == [series.sigma for series in bench.series]  # of what the effect has left
+    counted.weigh_as_before()
