@@ -124,7 +124,8 @@ def fit(
     power = known[1] if known is not None else math.nan
     if prune and chosen:
         whole = Measured(bench, Vector(state, tuple(chosen), held_effects), theta)
-        columns = whole.sensitivities(whole.start)
+        # What is carried on for a search is near its end already.
+        columns = whole.sensitivities(whole.start, tangents=rough and after is not None)
         asked = len(chosen) - sure
         rest = whole.residual(whole.start)
         split = determined(columns, rest, whole.priors, whole.blocks, asked, len(chosen))

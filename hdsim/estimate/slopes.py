@@ -30,7 +30,8 @@ class Slopes:
     Args:
         problem: what is fitted.
         known: the sensitivities near the start to the first numbers, shape (rows, up to p), where known.
-        thrifty: make them anew only where the last step has led away.
+        thrifty: make them anew only where the last step has led away, and then by secants: a fit that has so
+            far to go is led better by what is seen from afar.
     """
 
     def __init__(self, problem: Problem, known: Array | None = None, *, thrifty: bool = False) -> None:
@@ -42,7 +43,8 @@ class Slopes:
 
     def exact(self, x: Array) -> Array:
         """Made at ``x``, shape (rows, p)."""
-        self._columns, self._at = made(self._problem, x, like=self._columns, tangents=not self._thrifty), x.copy()
+        self._columns = made(self._problem, x, like=self._columns, tangents=not self._thrifty)
+        self._at = x.copy()
         return self._columns
 
     def proved(self, x: Array) -> Array:
