@@ -153,7 +153,7 @@ class Predictor(Prescribed):
                 near.append(None)
             else:
                 near.append(one if alike(model, one, end) else None)
-        if not any(near):
+        if all(one is None for one in near):
             return [None] * len(near)
         got, *there = self._sampled([model, *(one for one in near if one is not None)], self.plan.channels)
         here, changed = self._as_read(got), iter(there)

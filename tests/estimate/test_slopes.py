@@ -42,41 +42,6 @@ def test_what_is_far_above_the_noise_has_its_slope_not_a_secant(rig):
             assert np.linalg.norm(columns[:, k] - slope) < 0.03 * np.linalg.norm(slope), free.name
 
 
-def test_tangents_are_the_slopes_of_whole_runs_and_simulate_none(rig, monkeypatch):
-    bench, state = rig
-    fitting = catalogue()["torsional_hysteresis_maxwell"].fittings[0]
-    added = Added("torsional_hysteresis_maxwell", fitting, (2.0,), tuple(s.starts[0] for s in fitting.shapes))
-    vector = Vector(replace(state, added=(added,)), tuple(base_freedoms(state, bench.channels)), 0)
-    x = vector.start()
-    for predictor in bench.predictors:
-        predictor.rtol = 1e-9
-    predictions = bench.predict(vector.state(x))
-    slopes = []
-    for k in range(len(x)):
-        step = 1e-4 * (np.arange(len(x)) == k)
-        slopes.append(bench.trace(*(bench.predict(vector.state(x + s)) for s in (-step, step))) / 2e-4)
-
-    def fails(*_, **__):
-        raise AssertionError("a whole run")
-
-    monkeypatch.setattr(type(bench.predictors[0]), "predict", fails)
-    columns = sensitivities(bench, vector, x, predictions, tangents=True)
-    assert len(x) > len(vector.frees) > 5
-    for column, slope in zip(columns.T, slopes, strict=True):
-        assert np.linalg.norm(column - slope) < 0.01 * np.linalg.norm(slope) + 0.1
-
-
-def test_a_model_of_other_parts_has_no_tangent(rig):
-    bench, state = rig
-    fitting = catalogue()["output_backlash"].fittings[0]
-    more = replace(state, added=(Added("output_backlash", fitting, (1.0,), ()),))
-    same, none = bench.beside(state, [state, more])
-    assert none is None
-    for own, alike, predicted in zip(*same, bench.predict(state), strict=True):
-        np.testing.assert_array_equal(own, predicted)
-        np.testing.assert_array_equal(alike, predicted)
-
-
 def test_a_number_at_its_upper_end_is_asked_from_below(rig):
     # Beyond the end there is no model, and no change would look like no sensitivity.
     bench, state = rig
