@@ -75,7 +75,7 @@ def as_given(bench: Bench, found: Fit) -> Fit | None:
     )  # fmt: skip
 
 
-def from_where_it_was(bench: Bench, base: Fit, earlier: Fit) -> dict[str, tuple[Fit, bool]]:
+def from_where_it_was(bench: Bench, base: Fit, earlier: Fit | None) -> dict[str, tuple[Fit, bool]]:
     """An only effect that was fitted before samples were left out, fitted on from there, as a contest has it.
 
     A base that was bent by all that is missing may be far from there, and the way long.
@@ -85,7 +85,7 @@ def from_where_it_was(bench: Bench, base: Fit, earlier: Fit) -> dict[str, tuple[
         base: the re-fitted model without effects.
         earlier: the fit beside the samples that count no more.
     """
-    if len(earlier.state.added) != 1:
+    if earlier is None or len(earlier.state.added) != 1:
         return {}
     was, frees = {free.name: free.none for free in at_present(earlier)}, at_present(base)
     theta = {free.name: free.none - was[free.name] for free in frees if free.name in was}

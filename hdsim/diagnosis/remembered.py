@@ -40,23 +40,15 @@ def remembered(
 
     Args:
         bench: the measured series.
-        before: the earlier screening, if there is one; fewer samples may count by now.
+        before: the earlier screening, if there is one.
         state: the model.
         without: its predictions.
         sigmas: of every series now.
     """
     if before is None or before.state is None:
         return {}
-    pairs = [
-        (before.trained[k], series.train)
-        for k, series in enumerate(bench.series)
-        if series.record < bench.training
-    ]
-    if any(np.any(now & ~then) for then, now in pairs):
-        return {}
-    rows = np.concatenate([now[then] for then, now in pairs])
     factor = (before.sigmas / sigmas)[bench.stacked_series()][:, None]
-    seen = {key: (added, columns[rows] * factor) for key, (added, columns) in before.seen.items()}
+    seen = {key: (added, columns * factor) for key, (added, columns) in before.seen.items()}
     if not _moved(bench, before.state, state):
         return seen
     present = {added.effect for added in state.added}

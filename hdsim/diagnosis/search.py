@@ -72,7 +72,7 @@ class Search:
     named: list[Named] = field(default_factory=list)
     better: Fit | None = None
     thorough: bool = False
-    earlier: Search | None = None
+    earlier: Fit | None = None
     ended: bool = False
     anew: bool = False
 
@@ -83,7 +83,7 @@ def search(
     during: Callable[[str, str], Step],
     *,
     thorough: bool = False,
-    earlier: Search | None = None,
+    earlier: Fit | None = None,
 ) -> Search:
     """Add effects until nothing significant is left.
 
@@ -92,7 +92,7 @@ def search(
         base: the re-fitted model.
         during: told the step that begins and what it does; returns who is told the details.
         thorough: look for further effects whatever it takes (``hdsim.diagnosis.effort``).
-        earlier: a search after which all began anew.
+        earlier: the last fit of a search after which all began anew.
     """
     found, last = Search(base, left_of(bench, base), thorough=thorough, earlier=earlier), base
     while True:
@@ -179,11 +179,7 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     found.ended = more and not found.thorough and enough_done(bench, len(found.stages) - 1)
     if found.ended or not more:
         return None
-    fitted: Fitted = {}
-    if not found.named and found.earlier is not None:
-        fitted = from_where_it_was(bench, base, found.earlier.fit)
-    if fitted:
-        stage.over_given = []  # it begins beside a base that is not bent
+    fitted: Fitted = {} if found.named else from_where_it_was(bench, base, found.earlier)
     named = _one_more(bench, base, current, found, stage, bool(found.named), during, fitted)
     if found.named and (named is None or named.of_left < MOST):
         within = _one_more(bench, base, current, found, stage, False, during, fitted)
@@ -199,17 +195,9 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         if _heard(bench, found.fit, current):
             found.anew = True
             return current
-        screening = stage.screening
-        other = over_the_given(bench, found.fit, frozenset(), math.inf, stage, named, during)
-        if (
-            other is not None
-            and other is not named
-            and _matters(bench, base, found, stage, other, found.left)
-        ):
-            its = _finished(bench, base, found, other, during)
-            if unlikelihood(bench, its, its) < unlikelihood(bench, current, its):
-                named, current, screening = other, its, stage.screening
-        stage.screening = screening
+        # What is found again after all began anew, from beside a base that it had set right, is asked once.
+        if named.name not in fitted:
+            named, current = _or_over_the_given(bench, base, found, stage, named, current, during)
     stage.named = named
     found.named.append(named)
     align(bench, current)
@@ -229,6 +217,26 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
             found.named[:] = known
             return None
     return current
+
+
+def _or_over_the_given(
+    bench: Bench,
+    base: Fit,
+    found: Search,
+    stage: Stage,
+    named: Named,
+    current: Fit,
+    during: Callable[[str, str], Step],
+) -> tuple[Named, Fit]:
+    """The first effect, or one over the base as given where that is likelier once both are finished."""
+    screening = stage.screening
+    other = over_the_given(bench, found.fit, frozenset(), math.inf, stage, named, during)
+    if other is not None and other is not named and _matters(bench, base, found, stage, other, found.left):
+        its = _finished(bench, base, found, other, during)
+        if unlikelihood(bench, its, its) < unlikelihood(bench, current, its):
+            return other, its
+    stage.screening = screening
+    return named, current
 
 
 def _heard(bench: Bench, before: Fit, found: Fit) -> bool:
@@ -279,8 +287,6 @@ def _one_more(
     if stage.screening is None:
         tell = during("screen", "screening the catalogue")
         first = found.stages[0].screening
-        if first is None and found.earlier is not None:
-            first = found.earlier.stages[0].screening
         beaten = instead(found.named)
         lines = stage.location.lines
         screening = screen(

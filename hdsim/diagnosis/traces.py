@@ -21,7 +21,7 @@ from hdsim.effects import catalogue
 from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.orders import Line
-from hdsim.estimate.records import Array, Mask
+from hdsim.estimate.records import Array
 from hdsim.estimate.state import Added, State, number_at
 
 #: Starts that are many, and the share of a channel below which nothing lives in a coordinate.
@@ -57,7 +57,6 @@ class Screening:
         seen: traces that were simulated, whitened with ``sigmas``, by what was asked for (``key_of``):
             effect, way of fitting with its units and settings, shapes. Units that were used may be others.
         sigmas: of every series when they were.
-        trained: samples of every series that fits saw then, shape (n,) each.
         state: the model in which they were.
         behind: whether a way of fitting an effect acts behind the sensor whose reading is the load.
     """
@@ -67,7 +66,6 @@ class Screening:
     skipped: dict[str, str] = field(default_factory=dict)
     seen: Traces = field(default_factory=dict)
     sigmas: Array = field(default_factory=lambda: np.zeros(0))
-    trained: Sequence[Mask] = ()
     state: State | None = None
     behind: dict[tuple[str, str], bool] = field(default_factory=dict)
 
@@ -91,14 +89,13 @@ def screen(
         residual: what it leaves.
         lines: peaks of the order spectra.
         places: where the residual lives; fittings with many starts are left out where theirs shows nothing.
-        before: an earlier screening of these data, or of more of them. What an effect does is nearly the same
-            whatever other effects the model has by now, so its traces serve again, unless the model's own
-            numbers have moved so far that they are others; those that come near are refined anew.
+        before: an earlier screening of these data. What an effect does is nearly the same whatever other
+            effects the model has by now, so its traces serve again, unless the model's own numbers have moved
+            so far that they are others; those that come near are refined anew.
         leave_out: effects that need not be tried, because one that the model has does what they do.
         on_step: told what is being tried.
     """
     found = Screening(sigmas=np.array([series.sigma for series in bench.series]), state=state)
-    found.trained = [series.train for series in bench.series]
     found.behind = dict(before.behind) if before is not None else {}
     shares: list[Share] = []
     present = set(state.effects) | {added.effect for added in state.added}

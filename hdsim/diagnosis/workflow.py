@@ -180,13 +180,13 @@ def _diagnosed(
         return tell
 
     jumps: list[Jump] = []
-    earlier: Search | None = None
+    earlier: Fit | None = None
     with running:
         while True:
             found = search(bench, base.fit, during, thorough=thorough, earlier=earlier)
             if found.anew:
                 # The first effects have shown samples that do not count.
-                earlier = found
+                earlier = found.fit
                 during("refit", "re-fitting the parameters of the model")
                 base = refitted(bench, start)
             elif found.better is not None:

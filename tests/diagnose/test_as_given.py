@@ -73,10 +73,14 @@ def test_a_fit_is_all_where_it_has_reached_the_noise_and_has_not_bent_the_base(f
         assert is_all(bench, replace(found, frees=frees)) is expected
 
 
-@pytest.mark.parametrize(("all_explained", "asked"), [(True, 0), (False, 1)])
+@pytest.mark.parametrize(
+    ("all_explained", "again", "asked"),
+    [(True, None, 0), (False, None, 1), (False, "unbalance", 1), (False, "motor_torque_ripple", 0)],
+)
 def test_a_first_effect_is_asked_for_over_the_given_only_where_one_over_the_fit_is_not_all(
-    fitted, monkeypatch, all_explained, asked
+    fitted, monkeypatch, all_explained, again, asked
 ):
+    """Nor where it is found again after all began anew."""
     bench, found = fitted
     named, calls = SimpleNamespace(name="motor_torque_ripple", fit=found, worth_finer=False), []
 
@@ -88,6 +92,7 @@ def test_a_first_effect_is_asked_for_over_the_given_only_where_one_over_the_fit_
     monkeypatch.setattr(searching, "_finished", lambda *_: found)
     monkeypatch.setattr(searching, "over_the_given", over_the_given)
     monkeypatch.setattr(searching, "is_all", lambda *_: all_explained)
+    monkeypatch.setattr(searching, "from_where_it_was", lambda *_: {again: (found, True)} if again else {})
     monkeypatch.setattr(searching, "nothing_but_flanks", lambda *_: False)
     search = searching.Search(found, searching.left_of(bench, found))
     assert searching._next(bench, found, search, lambda *_: lambda _: None) is found

@@ -20,7 +20,6 @@ from hdsim.estimate.numbers import scaled
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.orders import lines_of
 from hdsim.estimate.refit import refit
-from hdsim.estimate.series import Counted
 from hdsim.estimate.state import State, state_of
 from hdsim.scenario import Scenario
 
@@ -105,26 +104,3 @@ def test_only_traces_that_the_spring_changes_are_made_anew(quarter: Quarter) -> 
     # What the motor alone feels, whose motion is measured, is the same with any spring.
     assert {"stribeck_friction", "thermal_friction", "load_dependent_loss"} <= asked
     assert not {"stribeck_friction", "motor_torque_ripple", "thermal_friction"} & changed
-
-
-@pytest.mark.slow
-def test_traces_of_rows_that_count_no_more_are_left_out(quarter: Quarter) -> None:
-    bench, base, _, screening = quarter
-    without = bench.predict(base.state)
-    counted = Counted(bench.series)
-    late = [bench.time_of(series) > 1.0 for series in bench.series]
-    still = np.concatenate([rows[series.train] for rows, series in zip(late, bench.series, strict=True)])
-    assert 0 < still.sum() < len(still)
-    try:
-        for rows, series in zip(late, bench.series, strict=True):
-            series.train = series.train & rows
-        kept = remembered(bench, screening, base.state, without, screening.sigmas)
-        assert kept.keys() == screening.seen.keys()
-        for key, (_, columns) in kept.items():
-            np.testing.assert_array_equal(columns, screening.seen[key][1][still])
-        # What has begun to count since was in no trace.
-        for series in bench.series:
-            series.train = series.train | series.hold
-        assert remembered(bench, screening, base.state, without, screening.sigmas) == {}
-    finally:
-        counted.put_back()
