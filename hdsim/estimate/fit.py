@@ -1,11 +1,11 @@
 """Output-error fits: a model's numbers by non-linear least squares on the predicted channels, with intervals.
 
-The Jacobian is made of finite differences whose step is large against the solver's noise, and of Broyden's
-updates between them (``slopes``). Residuals of a model are correlated in time, so the covariance is the
-cluster jackknife over blocks of time (``covariance``; MacKinnon, Nielsen and Webb 2023, Journal of
-Econometrics 232:272), and the fit weighs the data by the number of independent samples that they are worth
-(``minimise``). Every number has a prior spread: what the data say less about than that stays where it is
-(``determine``).
+The Jacobian is made of tangents near the end, elsewhere of finite differences whose step is large against
+the solver's noise, and of Broyden's updates between them (``slopes``). Residuals of a model are correlated in
+time, so the covariance is the cluster jackknife over blocks of time (``covariance``; MacKinnon, Nielsen and
+Webb 2023, Journal of Econometrics 232:272), and the fit weighs the data by the number of independent samples
+that they are worth (``minimise``). Every number has a prior spread: what the data say less about than that
+stays where it is (``determine``).
 """
 
 from __future__ import annotations

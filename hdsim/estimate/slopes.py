@@ -1,8 +1,8 @@
 """The Jacobian of a fit: made anew only where the last one no longer foretells the residuals.
 
-It is made of the problem's own derivatives or of finite differences; between two of them it follows the
-residuals that the fit sees anyway (Broyden 1965, Mathematics of Computation 19:577), for as long as it
-foretells them.
+It is made of the problem's own derivatives, of tangents or of finite differences; between two of them it
+follows the residuals that the fit sees anyway (Broyden 1965, Mathematics of Computation 19:577), for as long
+as it foretells them.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from diagnose_bench import rigid_record, scenario
 from test_real_data import KINOVA, ROOT
 
 import hdsim
+from hdsim.diagnosis import base as base_model
 from hdsim.diagnosis import workflow
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
@@ -118,7 +119,7 @@ def test_force_goes_on_in_spite_of_an_error(tmp_path, monkeypatch):
     def went_on(bench, start):
         raise InputError(f"went on with {len(bench.series)} channel")
 
-    monkeypatch.setattr(workflow, "refit", went_on)
+    monkeypatch.setattr(base_model, "refit", went_on)
     record = scaled(motor=180 / np.pi)
     model = scenario(tmp_path)
     with pytest.raises(InputError, match="rev/min"):
@@ -136,7 +137,7 @@ def test_a_re_fit_that_fails_once_all_begins_anew_is_told(tmp_path, monkeypatch)
         fitted.append(refit(bench, start))
         return fitted[0]
 
-    monkeypatch.setattr(workflow, "refit", fails_at_last)
+    monkeypatch.setattr(base_model, "refit", fails_at_last)
     monkeypatch.setattr(workflow, "search", lambda *_, **options: SimpleNamespace(anew=True, fit=None))
     with pytest.raises(InputError, match="r: the model cannot follow the measured motion: it ran away"):
         workflow.diagnose([scaled()], scenario(tmp_path))
