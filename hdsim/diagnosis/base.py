@@ -11,23 +11,26 @@ from collections.abc import Callable, Mapping
 
 from hdsim.errors import InputError
 from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.records import Array
 from hdsim.estimate.refit import Refit, first_look, refit
 from hdsim.estimate.state import State
 
 
-def refitted(bench: Bench, start: State) -> Refit:
+def refitted(bench: Bench, start: State, begun: tuple[list[Array], Fit] | None = None) -> Refit:
     """The model with its own numbers fitted.
 
     Args:
         bench: the measured series.
         start: the model as given.
+        begun: the first steps, where they have been taken.
 
     Raises:
         InputError: it cannot follow the motion.
     """
     try:
-        return refit(bench, start)
+        return refit(bench, start, begun=begun)
     except PredictionError as error:
         names = ", ".join(p.record.name for p in bench.predictors[: bench.training])
         raise InputError(f"{names}: the model cannot follow the measured motion: {error}") from None
@@ -57,13 +60,14 @@ def on_few_readings(
     """
     if allowed(dict.fromkeys(bench.channels, math.inf)) <= readings:
         return bench, refitted(bench, start), readings
-    fewer = allowed(_first_left(bench, start))
+    begun = _begun(bench, start)
+    fewer = readings if begun is None else allowed(bench.beyond_noise(begun[1].predictions))
     if fewer > readings:
         few = opened(fewer)
         base = refitted(few, start)
         if allowed(few.beyond_noise(base.fit.predictions)) >= fewer:
             return few, base, fewer
-    base = refitted(bench, start)
+    base = refitted(bench, start, begun)
     fewer = allowed(bench.beyond_noise(base.fit.predictions))
     if fewer <= readings:
         return bench, base, readings
@@ -71,9 +75,9 @@ def on_few_readings(
     return few, refitted(few, start), fewer
 
 
-def _first_left(bench: Bench, start: State) -> Mapping[str, float]:
-    """Mean square that a first fit leaves of each channel beyond the noise; nothing if there is none."""
+def _begun(bench: Bench, start: State) -> tuple[list[Array], Fit] | None:
+    """The first steps of a re-fit; None where the model as given cannot be predicted."""
     try:
-        return bench.beyond_noise(first_look(bench, start))
+        return first_look(bench, start)
     except PredictionError:
-        return {}
+        return None

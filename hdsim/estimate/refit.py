@@ -64,16 +64,23 @@ class Refit:
         return [interval for interval in self.intervals if interval.moved]
 
 
-def refit(bench: Bench, state: State, frees: Sequence[Free] | None = None) -> Refit:
+def refit(
+    bench: Bench,
+    state: State,
+    frees: Sequence[Free] | None = None,
+    *,
+    begun: tuple[list[Array], Fit] | None = None,
+) -> Refit:
     """Fit the base model's numbers to the training data.
 
     Args:
         bench: the measured series; their weights are set on the way.
         state: the base model.
         frees: numbers that may move; all that the base has when None.
+        begun: its first steps (``first_look``), where they have been taken.
     """
     freedoms = _own_numbers(bench, state) if frees is None else list(frees)
-    before, found = _roughly(bench, state, freedoms)
+    before, found = begun or _roughly(bench, state, freedoms)
     # A vibration at the beginning bends a fit, and one that is less bent shows more of it.
     for _ in range(BEGINNINGS):
         if not (hear_beginning(bench, before) or hear_beginning(bench, found.predictions)):
@@ -142,13 +149,13 @@ def _delayed(bench: Bench, found: Fit, heard: Callable[[Fit], bool]) -> Fit:
     return late
 
 
-def first_look(bench: Bench, state: State) -> list[Array]:
-    """Predictions of the model after the first steps of a re-fit.
+def first_look(bench: Bench, state: State) -> tuple[list[Array], Fit]:
+    """The first steps of a re-fit: predictions of the model as given, and a first fit.
 
     Raises:
         PredictionError: the model as given could not be predicted.
     """
-    return _roughly(bench, state, _own_numbers(bench, state))[1].predictions
+    return _roughly(bench, state, _own_numbers(bench, state))
 
 
 def _own_numbers(bench: Bench, state: State) -> list[Free]:

@@ -15,9 +15,8 @@ class Opened:
 
     def __init__(self, readings, first=0.0, last=0.0):
         self.readings, self.first, self.last = readings, first, last
-        self.channels = ("motor_torque",)
+        self.channels, self.looked = ("motor_torque",), False
         self.predictors, self.training = [SimpleNamespace(record=SimpleNamespace(name="run"))], 1
-        self.fitted = 0
 
     def beyond_noise(self, predictions):
         return {"motor_torque": float(predictions[0])}
@@ -28,12 +27,20 @@ def fits(monkeypatch):
     """Every re-fit, by the readings that it was of."""
     done: list[int] = []
 
-    def refit(bench, start):
+    def refit(bench, start, begun):
+        # What a first look has done is not done again.
+        assert begun is None or begun[1].predictions[0] == bench.first
+        assert (begun is None) == (bench.readings == 4 or not bench.looked)
         done.append(bench.readings)
         return SimpleNamespace(fit=SimpleNamespace(predictions=[np.array(bench.last)]))
 
     monkeypatch.setattr(few, "refit", refit)
-    monkeypatch.setattr(few, "first_look", lambda bench, start: [np.array(bench.first)])
+
+    def first_look(bench, start):
+        bench.looked = True
+        return [], SimpleNamespace(predictions=[np.array(bench.first)])
+
+    monkeypatch.setattr(few, "first_look", first_look)
     return done
 
 
@@ -68,7 +75,7 @@ def test_where_no_more_readings_could_be_taken_nothing_is_looked_at(fits, monkey
 
 
 def test_a_model_that_cannot_follow_the_motion_is_one_clear_error(monkeypatch):
-    def fails(*_):
+    def fails(*_, **__):
         raise PredictionError("the run became unstable at 0.2 s")
 
     monkeypatch.setattr(few, "refit", fails)

@@ -116,7 +116,7 @@ def test_a_log_of_another_drive_is_told_by_its_ratio_or_suspected_by_its_torque(
 
 
 def test_force_goes_on_in_spite_of_an_error(tmp_path, monkeypatch):
-    def went_on(bench, start):
+    def went_on(bench, start, begun):
         raise InputError(f"went on with {len(bench.series)} channel")
 
     monkeypatch.setattr(base_model, "refit", went_on)
@@ -131,7 +131,7 @@ def test_force_goes_on_in_spite_of_an_error(tmp_path, monkeypatch):
 def test_a_re_fit_that_fails_once_all_begins_anew_is_told(tmp_path, monkeypatch):
     fitted = []
 
-    def fails_at_last(bench, start):
+    def fails_at_last(bench, start, begun):
         if fitted:
             raise PredictionError("it ran away")
         fitted.append(refit(bench, start))
