@@ -19,7 +19,7 @@ from hdsim.diagnosis.evidence import (
 from hdsim.diagnosis.held import held_of, law_of, own_held
 from hdsim.diagnosis.locate import Location
 from hdsim.diagnosis.name import Named
-from hdsim.diagnosis.search import Search, Stage
+from hdsim.diagnosis.passes import Search, Stage
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.flanks import nothing_but_flanks, only_flanks

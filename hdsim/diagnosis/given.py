@@ -21,7 +21,7 @@ from hdsim.estimate.refit import REACHED, unlikelihood
 from hdsim.estimate.standstill import CLEARLY
 
 if TYPE_CHECKING:
-    from hdsim.diagnosis.search import Stage
+    from hdsim.diagnosis.passes import Stage
 
 #: Squared prior spreads by which a base may be bent without another explanation being clearly likelier.
 AT_STAKE = 2.0 * CLEARLY

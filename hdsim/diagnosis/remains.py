@@ -8,9 +8,9 @@ from dataclasses import replace
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.locate import locate
+from hdsim.diagnosis.passes import Search
 from hdsim.diagnosis.revise import revised
 from hdsim.diagnosis.rules import RULES
-from hdsim.diagnosis.search import Search
 from hdsim.diagnosis.verdict import Remains
 from hdsim.estimate.asked import gone_with
 from hdsim.estimate.bench import Bench

@@ -22,7 +22,7 @@ from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Mask
-from hdsim.estimate.refit import at_its_end, together
+from hdsim.estimate.refit import REACHED, at_its_end, together
 from hdsim.estimate.series import Counted
 from hdsim.estimate.standstill import (
     CLEARLY,
@@ -56,11 +56,18 @@ def hear_rest(bench: Bench, before: Fit, found: Fit) -> bool:
         lambda: together(bench, found, rough=True),
         partial(at_its_end, bench),
     )
-    return later is not found or _only_sticks(bench, before, found)
+    return later is not found or only_sticks(bench, before, found)
 
 
-def _only_sticks(bench: Bench, before: Fit, found: Fit) -> bool:
-    """Leave rests out where a model that only sticks is clearly likelier than the effect that was found."""
+def only_sticks(bench: Bench, before: Fit, found: Fit, *, whole: bool = False) -> bool:
+    """Leave rests out where a model that only sticks is clearly likelier than the effect that was found.
+
+    Args:
+        bench: the measured series, weighed; masks are changed where that is so.
+        before: the model before that effect was found.
+        found: the model with it.
+        whole: only where it leaves no more than the noise, too.
+    """
     turning = while_turning(bench)
     if not before.state.drive.friction.sticks or not missed_at_rest(bench, before.predictions, turning):
         return False
@@ -69,7 +76,8 @@ def _only_sticks(bench: Bench, before: Fit, found: Fit) -> bool:
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         if count_only(bench, turning):
             alone = at_its_end(bench, before)
-            likelier = _likelier_at_rest(bench, alone, found, counted.trained) > CLEARLY
+            enough = not whole or bench.power(alone.predictions) <= REACHED * bench.noise_power
+            likelier = enough and _likelier_at_rest(bench, alone, found, counted.trained) > CLEARLY
     if likelier:
         counted.weigh_as_before()
     else:

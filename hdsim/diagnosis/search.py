@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines
+from hdsim.diagnosis.anew import begun_anew, gone_on_with, heard
 from hdsim.diagnosis.beyond import beyond_curves
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
 from hdsim.diagnosis.effort import MOST_EFFECTS, MOST_STAGES, enough_done, more_could
@@ -23,20 +24,20 @@ from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.given import is_all, over_the_given
 from hdsim.diagnosis.held import hopeless
 from hdsim.diagnosis.late import lines_shown, read_late
-from hdsim.diagnosis.locate import SHARP, Location, locate
+from hdsim.diagnosis.locate import SHARP, locate
 from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
+from hdsim.diagnosis.passes import Search, Stage
 from hdsim.diagnosis.point import from_where_it_was
-from hdsim.diagnosis.rest import hear_rest
+from hdsim.diagnosis.rest import only_sticks
 from hdsim.diagnosis.revise import base_alone, revised
 from hdsim.diagnosis.screen import LEVEL, Residual
-from hdsim.diagnosis.swing import hear_swing
-from hdsim.diagnosis.traces import Screening, ranked_anew, screen
+from hdsim.diagnosis.traces import ranked_anew, screen
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
 from hdsim.estimate.refit import align, as_far_as_promised, reweigh, together, unlikelihood, with_delays
-from hdsim.estimate.series import Counted
 from hdsim.estimate.short_cut import follow_teeth
+from hdsim.estimate.standstill import has_a_sign
 
 #: Part of what a channel lacked at first that a later effect must explain where a smooth curve over the
 #: coordinates of the effects before it would, because no formula is exact.
@@ -45,45 +46,13 @@ WITHIN_GAIN = 0.1
 MOST = 0.5
 
 
-@dataclass
-class Stage:
-    """One pass of locate and name."""
-
-    title: str
-    location: Location
-    power: float
-    screening: Screening | None = None
-    named: Named | None = None
-    over_given: list[tuple[Named, Screening]] | None = field(default=None, repr=False)
-
-
-@dataclass
-class Search:
-    """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit.
-
-    ``better`` is the base without effects where its own numbers explain what the only one was given for.
-    Where it has done enough and not all is explained, it has ``ended``. All begins ``anew`` where a vibration
-    at the beginning of a record, or a shaft that sticks, was behind the first effects: it counts no more.
-    """
-
-    fit: Fit
-    left: Residual
-    stages: list[Stage] = field(default_factory=list)
-    named: list[Named] = field(default_factory=list)
-    better: Fit | None = None
-    thorough: bool = False
-    earlier: Fit | None = None
-    ended: bool = False
-    anew: bool = False
-
-
 def search(
     bench: Bench,
     base: Fit,
     during: Callable[[str, str], Step],
     *,
     thorough: bool = False,
-    earlier: Fit | None = None,
+    earlier: Search | None = None,
 ) -> Search:
     """Add effects until nothing significant is left.
 
@@ -92,18 +61,24 @@ def search(
         base: the re-fitted model.
         during: told the step that begins and what it does; returns who is told the details.
         thorough: look for further effects whatever it takes (``hdsim.diagnosis.effort``).
-        earlier: the last fit of a search after which all began anew.
+        earlier: the search after which all began anew.
     """
-    found, last = Search(base, left_of(bench, base), thorough=thorough, earlier=earlier), base
+    if earlier is not None and earlier.kept:
+        found = gone_on_with(bench, earlier)
+    else:
+        was = None if earlier is None else earlier.fit
+        found = Search(base, left_of(bench, base), thorough=thorough, earlier=was)
+    last = found.fit, list(found.named)
     while True:
-        if found.named and _heard(bench, last, found.fit):
-            found.anew = True
-            return found
+        if found.named and found.fit is not found.asked and heard(bench, last[0], found.fit):
+            return begun_anew(bench, found, last, (found.fit, found.named))
+        names = list(found.named)
         following = _next(bench, base, found, during)
         if following is not None:
-            last, found.fit = found.fit, following
+            last, found.fit = (found.fit, names), following
             if found.anew:
-                return found
+                newest = found.stages[-1].named
+                return begun_anew(bench, found, last, (following, [*names, newest] if newest else []))
             follow_teeth(bench, base.state, following.state)
             continue
         late = with_delays(bench, found.fit, rough=True)
@@ -192,9 +167,10 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     current = _finished(bench, base, found, named, during)
     if not found.named and not is_all(bench, current):
-        if _heard(bench, found.fit, current):
-            found.anew = True
+        if heard(bench, found.fit, current):
+            found.anew, stage.named = True, named
             return current
+        found.asked = current
         # What is found again after all began anew, from beside a base that it had set right, is asked once.
         if named.name not in fitted:
             named, current = _or_over_the_given(bench, base, found, stage, named, current, during)
@@ -204,6 +180,9 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     reweigh(bench, current)
     if len(found.named) > 1:
         known = [replace(one, group=dict(one.group)) for one in found.named[:-1]]
+        if has_a_sign(current.state) and only_sticks(bench, found.fit, current, whole=True):
+            found.anew = True
+            return current
         tell = during("again", "testing each effect again beside the others")
         if current.undetermined:
             current = together(bench, current, rough=True)
@@ -237,17 +216,6 @@ def _or_over_the_given(
             return other, its
     stage.screening = screening
     return named, current
-
-
-def _heard(bench: Bench, before: Fit, found: Fit) -> bool:
-    """Whether the effect found last has shown samples that do not count, or a shaft that sticks."""
-    counted = Counted(bench.series)
-    # What it explained no longer counts as noise.
-    bench.weigh(bench.residuals(found.predictions))
-    heard = hear_swing(bench, found) or hear_rest(bench, before, found)
-    if not heard:
-        counted.weigh_as_before()
-    return heard
 
 
 def _finished(

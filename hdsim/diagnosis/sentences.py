@@ -9,8 +9,8 @@ from hdsim.diagnosis.decide import Decision
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.locate import SHARP
 from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.passes import Stage
 from hdsim.diagnosis.remainder import remainder
-from hdsim.diagnosis.search import Stage
 from hdsim.diagnosis.verdict import IdentifiedEffect, Located, Remains, Verdict
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench

@@ -9,14 +9,16 @@ without that. Where most of what was left goes with it, it does not count.
 from __future__ import annotations
 
 import contextlib
+from dataclasses import replace
 
 import numpy as np
 
 from hdsim.estimate.beginning import EARLY, hear_beginning
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit
+from hdsim.estimate.fit import Fit, sharpened
+from hdsim.estimate.free_swing import swinging
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.refit import together
+from hdsim.estimate.refit import MUCH, as_far_as_promised, together
 from hdsim.estimate.series import Counted
 
 #: Part of what a model leaves beyond the noise that is most of it.
@@ -48,6 +50,28 @@ def hear_swing(bench: Bench, found: Fit) -> bool:
     counted.put_back()
     bench.begins_s = begins_s
     return False
+
+
+def let_swing(bench: Bench, found: Fit) -> Fit:
+    """The model with loads that swing where records begin, where it leaves less than half of what it did.
+
+    Args:
+        bench: the measured series, weighed; what is taken out of them is changed where that is so.
+        found: the model with the effects that were found.
+    """
+    before = _beyond(bench, found)
+    if before <= 0.0 or bench.swings:
+        return found
+    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+        state, predictions = swinging(bench, found.state, found.predictions)
+        if bench.swings:
+            freed = together(bench, replace(found, state=state, predictions=predictions), rough=True)
+            if _beyond(bench, freed) < (1.0 - MUCH) * before:
+                freed = as_far_as_promised(bench, sharpened(bench, freed))
+            if _beyond(bench, freed) < (1.0 - MOST) * before:
+                return freed
+    bench.swings = {}
+    return found
 
 
 def _beyond(bench: Bench, found: Fit) -> float:

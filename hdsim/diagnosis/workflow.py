@@ -18,9 +18,10 @@ from hdsim.diagnosis.effort import told_of_end
 from hdsim.diagnosis.evidence import Evidence
 from hdsim.diagnosis.growth import tracked
 from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.passes import Search, Stage
 from hdsim.diagnosis.remains import remains, taken_back
 from hdsim.diagnosis.rules import RULES
-from hdsim.diagnosis.search import Search, Stage, search
+from hdsim.diagnosis.search import search
 from hdsim.diagnosis.sentences import (
     effect_words,
     fitted_number,
@@ -180,13 +181,13 @@ def _diagnosed(
         return tell
 
     jumps: list[Jump] = []
-    earlier: Fit | None = None
+    earlier: Search | None = None
     with running:
         while True:
             found = search(bench, base.fit, during, thorough=thorough, earlier=earlier)
             if found.anew:
                 # The first effects have shown samples that do not count.
-                earlier = found.fit
+                earlier = found
                 during("refit", "re-fitting the parameters of the model")
                 base = refitted(bench, start)
             elif found.better is not None:

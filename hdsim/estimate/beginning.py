@@ -48,7 +48,7 @@ def hear_beginning(bench: Bench, predictions: Sequence[Array], *, first: int = 0
         if index < first:
             continue
         time = predictor.record.time
-        if len(time) < SAMPLES * STRETCHES or _at_rest(predictor):
+        if len(time) < SAMPLES * STRETCHES or begins_at_rest(predictor):
             continue
         own = [k for k, s in enumerate(bench.series) if s.record == index and len(residuals[k])]
         # Stretches of as many samples that count, or the shorter ones would scatter more.
@@ -78,15 +78,25 @@ def hear_beginning(bench: Bench, predictions: Sequence[Array], *, first: int = 0
     return heard
 
 
-def _at_rest(predictor: Predictor) -> bool:
+def begins_at_rest(predictor: Predictor) -> bool:
     """Whether a record begins at rest, as its prediction does: then nothing swings yet."""
     slow = at_rest(predictor)
     return bool(slow[predictor.record.time - predictor.record.time[0] <= SETTLE_S].all())
 
 
 def beginnings(bench: Bench) -> list[Problem]:
-    """What was left out, for the report."""
-    return [
+    """What was left out, and which loads swing beside the model, for the report."""
+    swings = [
+        Problem(
+            bench.predictors[index].record.name,
+            "time",
+            "beginning",
+            "info",
+            "begins in a motion of unknown history: how its load swings then is fitted to it",
+        )
+        for index in bench.swings
+    ]
+    return swings + [
         Problem(
             bench.predictors[index].record.name,
             "time",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.estimate.records import Array, Mask
 from hdsim.estimate.series import Series
 from hdsim.estimate.still import fresh
+from hdsim.estimate.swings import Swings, swing_columns, swung_on, without_swings
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
@@ -56,6 +58,8 @@ class Bench:
         self.redrawn: list[list[Array]] = []
         #: Time at the beginning of records that does not count, s (``hdsim.estimate.beginning``).
         self.begins_s: dict[int, float] = {}
+        #: What swings of the training records' loads do (``hdsim.estimate.free_swing``).
+        self.swings: Swings = {}
         #: Error of the short cut that was not taken (``hdsim.estimate.short_cut``), by channel.
         self.refused: dict[str, float] = {}
         for index, predictor in enumerate(self.predictors):
@@ -64,7 +68,7 @@ class Bench:
             raise InputError("no trusted sample is left to fit")
 
     def _add(self, index: int, predictor: Predictor, *, own_record: bool, split: bool) -> None:
-        record = predictor.record
+        record, predictor.number = predictor.record, index
         n = len(record.time)
         count = int(np.clip(record.duration_s / BLOCK_S, FEWEST_BLOCKS, MOST_BLOCKS))
         block = np.minimum((np.arange(n) * count) // n, count - 1)
@@ -124,9 +128,7 @@ class Bench:
 
     def trace(self, base: Sequence[Array], there: Sequence[Array]) -> Array:
         """Whitened difference of two sets of predictions, offsets removed, shape (rows,)."""
-        changes = [b - a for a, b in zip(base, there, strict=True)]
-        shifts = offsets_of(self.series, changes, self.zeros, drift=False)
-        return self.stacked([change - zero for change, zero in zip(changes, shifts, strict=True)])
+        return self.stacked(self._without([b - a for a, b in zip(base, there, strict=True)], drift=False))
 
     def ranges(self, state: State) -> dict[str, float]:
         """What the training records cover, by the names that fittings use (``covered``)."""
@@ -240,9 +242,23 @@ class Bench:
             drift: whether zeros may drift between records: where what is missing is judged, not where numbers
                 are fitted, which would be bent by as much as is forgiven.
         """
-        apart = self.apart(predictions)
-        offsets = offsets_of(self.series, apart, self.zeros, drift=drift)
-        return [rest - offset for rest, offset in zip(apart, offsets, strict=True)]
+        return self._without(self.apart(predictions), drift=drift)
+
+    def _without(self, values: Sequence[Array], *, drift: bool) -> list[Array]:
+        """Residuals or changes without what zeros of sensors and swings of loads may do."""
+        return without_swings(self.series, self._centred(values, drift=drift), self.swings)
+
+    def _centred(self, values: Sequence[Array], *, drift: bool) -> list[Array]:
+        """Residuals or changes without what zeros of sensors may do."""
+        offsets = offsets_of(self.series, values, self.zeros, drift=drift)
+        return [value - offset for value, offset in zip(values, offsets, strict=True)]
+
+    def swung_on(self, state: State, predictions: Sequence[Array]) -> State:
+        """The model with the swings of the training records' loads that leave least beside these."""
+        if not self.swings:
+            return state
+        rest = self._centred(self.apart(predictions), drift=False)
+        return replace(state, swings=swung_on(self.series, rest, self.swings, state.swings))
 
     def apart(self, predictions: Sequence[Array]) -> list[Array]:
         """Measured less predicted; empty where nothing is predicted."""
@@ -252,8 +268,9 @@ class Bench:
         ]
 
     def offset_columns(self) -> Array:
-        """What a shift of each sensor's zero does to the rows of ``stacked``, shape (rows, zeros)."""
-        return offset_columns(self.series, self.training, self.zeros)
+        """What sensors' zeros, and swings of loads, do to the rows of ``stacked``, shape (rows, k)."""
+        zeros = offset_columns(self.series, self.training, self.zeros)
+        return np.hstack([zeros, swing_columns(self.series, self.training, self.swings)])
 
     def block_powers(self, predictions: Sequence[Array]) -> Array:
         """Power of the whitened training residual in each block, shape (blocks,)."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -68,6 +68,11 @@ class Fit:
         widths = [len(one.coefficients) + len(one.shapes) for one in self.state.added]
         first = len(self.frees) + sum(widths[:effect])
         return slice(first, first + widths[effect])
+
+    def become(self, other: Fit) -> None:
+        """Take over all that another fit of the same numbers found."""
+        for each in fields(self):
+            setattr(self, each.name, getattr(other, each.name))
 
     def ordered(self, effects: Sequence[int]) -> Fit:
         """The same fit with its effects in another order."""
@@ -178,7 +183,7 @@ def fit(
         else robust_covariance(columns, found.rest, problem.blocks, priors, beside)
     )
     return Fit(
-        vector.state(found.x), chosen, vector.logarithms(found.x), covariance,
+        problem.swung(found.x).state(found.x), chosen, vector.logarithms(found.x), covariance,
         problem.predicted(found.x), columns, undetermined, ties, beside, promised,
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ are predicted; without the motor's encoder torques are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,12 +41,13 @@ Change = tuple[dict[str, Array], dict[str, Array]]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A model as the predictions need it."""
+    """A model as the predictions need it; see ``State``."""
 
     drive: Drive
     effects: dict[str, Effect]
     load: Any
     seed: int = 0
+    swings: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
 
 class Predictor(Prescribed):
@@ -76,6 +77,8 @@ class Predictor(Prescribed):
         #: Of drives with teeth (``hdsim.estimate.short_cut``): no short cut; whose teeth are in a table.
         self.whole = False
         self.table_for: frozenset[str] | None = None
+        #: Number of the record among those that are held against a model together.
+        self.number = 0
 
     def measured(self, channel: str) -> tuple[Array, Mask, float, float]:
         """What a predicted channel is compared with.
@@ -123,7 +126,7 @@ class Predictor(Prescribed):
             PredictionError: the model cannot be, or could not be integrated.
         """
         asked = tuple(dict.fromkeys((*self.plan.channels, *also)))
-        (got,) = self._sampled([self._model(candidate)], asked)
+        (got,) = self._sampled([self._model(candidate)], asked, self._swing(candidate))
         return self._as_read(got) | {f"true_{name}": got[name] for name in also}
 
     def beside(self, candidate: Candidate, others: Sequence[Candidate]) -> list[Change | None]:
@@ -155,20 +158,71 @@ class Predictor(Prescribed):
                 near.append(one if alike(model, one, end) else None)
         if all(one is None for one in near):
             return [None] * len(near)
-        got, *there = self._sampled([model, *(one for one in near if one is not None)], self.plan.channels)
+        models = [model, *(one for one in near if one is not None)]
+        got, *there = self._sampled(models, self.plan.channels, self._swing(candidate))
         here, changed = self._as_read(got), iter(there)
         return [None if one is None else (here, self._as_read(next(changed))) for one in near]
 
-    def _sampled(self, models: Sequence[Model], channels: Sequence[str]) -> list[dict[str, Array]]:
-        """Channels of a model, and of those that are linearised beside it, at the record's times."""
+    def set_free(
+        self, candidate: Candidate, changes: Array, until_s: float = np.inf
+    ) -> tuple[list[dict[str, Array]], Array]:
+        """What a model predicts, and what it would with other swings at the record's beginning.
+
+        Args:
+            candidate: the model.
+            changes: of angle and speed of the output there, shape (k, 2): so small that they are linear.
+            until_s: the last time that is predicted, s; from there on all stays as it was.
+
+        Returns:
+            Predicted channels with the swing that is, and with each change of it: none of a model whose
+            output does not swing. What angle and speed are when wound up by the rated torque, (2,).
+
+        Raises:
+            PredictionError: the model cannot be, or could not be integrated.
+        """
+        from hdsim.simulation.sample import alike
+
+        model, size = self._model(candidate), len(self.record.time)
+        at = model.place_of.get("output")
+        if self.plan.locked or at is None or not alike(model, model, until_s):
+            return [], np.ones(2)
+        # Means of readings reach to the next one.
+        count = min(int(np.searchsorted(self.record.time, until_s, "right")) + 2, size)
+        swings = self._swing(candidate) + np.vstack([np.zeros(2), changes])
+        found = self._sampled([model] * len(swings), self.plan.channels, swings, count)
+        found = [{c: np.pad(v, (0, size - count), mode="edge") for c, v in got.items()} for got in found]
+        return [self._as_read(got) for got in found], model.system.scale[at : at + 2]
+
+    def _swing(self, candidate: Candidate) -> Array:
+        """Angle and speed of the output's swing where the record begins, shape (2,), rad and rad/s."""
+        return np.array(candidate.swings.get(self.number, (0.0, 0.0)))
+
+    def _sampled(
+        self, models: Sequence[Model], channels: Sequence[str], swings: Array, count: int | None = None
+    ) -> list[dict[str, Array]]:
+        """Channels of a model, and of those that are linearised beside it, at the record's times.
+
+        Args:
+            models: these.
+            channels: which.
+            swings: where the record begins, of all of them, shape (2,), or of each, (models, 2).
+            count: how many of these times; all of them when None.
+        """
         from hdsim.simulation.run import RunFailed
-        from hdsim.simulation.sample import samples_beside
+        from hdsim.simulation.sample import SetFree, samples_beside
 
         model, *others = models
+        free, at = None, model.place_of.get("output")
+        if at is not None and swings.any():
+            jumps = np.zeros((len(models), model.system.size))
+            jumps[:, at : at + 2] = swings
+            free = SetFree(LEAD_IN_S, jumps)
         scale, steps = model.seen_scale(CLOSER if self.whole else 1.0), [] if self.whole else self.steps
-        times, rtol = self.record.time + LEAD_IN_S, self.rtol
+        times, rtol = self.record.time[:count] + LEAD_IN_S, self.rtol
         try:
-            return samples_beside(model, others, times, channels, rtol=rtol, atol=rtol * scale, steps=steps)
+            return samples_beside(
+                model, others, times, channels, rtol=rtol, atol=rtol * scale, steps=steps, set_free=free
+            )
         except RunFailed as error:
             raise PredictionError(str(error)) from None
 

@@ -10,6 +10,7 @@ from hdsim.estimate.beginning import hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.found import Gap
+from hdsim.estimate.free_swing import swinging
 from hdsim.estimate.records import Array, Mask
 from hdsim.estimate.series import Series
 from hdsim.estimate.short_cut import whole_models
@@ -33,7 +34,7 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
         states: the three models.
     """
     with whole_models(bench):
-        predictions = {stage: turned_to_zero(bench, state) for stage, state in states.items()}
+        predictions = {stage: _begun(bench, state) for stage, state in states.items()}
     hear_beginning(bench, predictions["after"], first=bench.training)
     residuals = {stage: bench.residuals(found, drift=True) for stage, found in predictions.items()}
     rng = np.random.default_rng(17)
@@ -56,6 +57,13 @@ def gaps(bench: Bench, states: Mapping[str, State]) -> tuple[dict[str, Gap], dic
             intervals=intervals,
         )
     return result, predictions
+
+
+def _begun(bench: Bench, state: State) -> list[Array]:
+    """Predictions of all series, each held-out record begun as suits the model best."""
+    predictions = turned_to_zero(bench, state)
+    # Where loads swing in the records that were learnt from, they may in the others.
+    return swinging(bench, state, predictions, held_out=True)[1] if bench.swings else predictions
 
 
 def borne_out(bench: Bench, before: Sequence[Array], after: Sequence[Array]) -> tuple[float, float]:

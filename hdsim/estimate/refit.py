@@ -15,6 +15,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import robust_covariance
 from hdsim.estimate.fit import Fit, at_present, base_intervals, fit, settled, sharpened, strain
 from hdsim.estimate.flanks import hear_flanks, widen_by_flanks
+from hdsim.estimate.free_swing import swinging
 from hdsim.estimate.motion_noise import hear_motion
 from hdsim.estimate.numbers import Free, Interval, base_freedoms, delay_freedoms
 from hdsim.estimate.offsets import part_zeros
@@ -166,6 +167,7 @@ def _own_numbers(bench: Bench, state: State) -> list[Free]:
 
 def _roughly(bench: Bench, state: State, freedoms: Sequence[Free]) -> tuple[list[Array], Fit]:
     """Predictions of the model as given, and a first fit."""
+    bench.swings = {}
     before = bench.predict(state)
     speeds = [predictor.motor_velocity for predictor in bench.predictors[: bench.training]]
     part_zeros(bench.series, bench.apart(before), bench.zeros, speeds)
@@ -320,9 +322,11 @@ def with_delays(bench: Bench, found: Fit, *, rough: bool = False) -> Fit | None:
 
 
 def align(bench: Bench, found: Fit) -> None:
-    """Turn locked records to where the fitted model carries nothing."""
+    """Turn locked records to where the fitted model carries nothing, and let loads that swing do so."""
     if turn_to_zero(bench, found.state, found.predictions):
         found.predictions = bench.predict(found.state)
+    if bench.swings:
+        found.state, found.predictions = swinging(bench, found.state, found.predictions)
 
 
 def reweigh(bench: Bench, found: Fit) -> float:

@@ -116,6 +116,8 @@ class State:
         gains: sensitivities of the torques' readings where they are not 1, by channel.
         seed: seed of the model.
         delays: age of the torques' readings beside that of the motion's, s, by channel.
+        swings: angle (rad) and speed (rad/s) by which the output is off its balance where records begin, by
+            their numbers (``hdsim.estimate.free_swing``).
     """
 
     drive: Any
@@ -125,6 +127,7 @@ class State:
     gains: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     delays: Mapping[str, float] = field(default_factory=dict)
+    swings: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def toothed(self) -> bool:
@@ -160,7 +163,7 @@ class State:
             if isinstance(effect, Table):
                 # A curve over time begins with the record, after the lead-in.
                 effects[name] = effect.delayed(LEAD_IN_S)
-        return Candidate(self.drive, effects, self.load, self.seed)
+        return Candidate(self.drive, effects, self.load, self.seed, self.swings)
 
     def merged_effects(self) -> dict[str, Any]:
         """The base's effects and those that were added, by name.

@@ -161,8 +161,10 @@ class Measured:
         self.priors = vector.priors()
         self.centre = vector.centre(self.start)
         self.blocks = bench.stacked_blocks()
-        #: Predictions by the bytes of where they were made.
+        #: Predictions by the bytes of where they were made, and how loads swung in them where records begin.
         self.predictions: dict[bytes, list[Array]] = {}
+        self._swung: dict[bytes, Vector] = {}
+        self._nearest = np.inf
 
     def residual(self, x: Array) -> Array:
         """Whitened, shape (rows,).
@@ -170,13 +172,25 @@ class Measured:
         Raises:
             PredictionError: the model could not be predicted.
         """
-        return self.bench.stacked(self.bench.residuals(self.predicted(x)))
+        predictions = self.predicted(x)
+        rest = self.bench.stacked(self.bench.residuals(predictions))
+        if self.bench.swings and float(rest @ rest) < self._nearest:
+            # From there on loads swing as they had best.
+            self._nearest = float(rest @ rest)
+            base = self.bench.swung_on(self.swung(x).base, predictions)
+            self.vector = replace(self.vector, base=base)
+        return rest
+
+    def swung(self, x: Array) -> Vector:
+        """The numbers beside the swings with which the prediction was made."""
+        return self._swung.get(x.tobytes(), self.vector)
 
     def predicted(self, x: Array) -> list[Array]:
         """Predictions of the training records, made once."""
         found = self.predictions.get(x.tobytes())
         if found is None:
             found = self.predictions[x.tobytes()] = self.bench.predict(self.vector.state(x))
+            self._swung[x.tobytes()] = self.vector
         return found
 
     def steps(self, x: Array) -> Array:
@@ -196,7 +210,7 @@ class Measured:
     ) -> Array:
         """See ``sensitivities``."""
         known = self.predictions.get(x.tobytes())
-        return sensitivities(self.bench, self.vector, x, known, first=first, like=like, tangents=tangents)
+        return sensitivities(self.bench, self.swung(x), x, known, first=first, like=like, tangents=tangents)
 
 
 def sensitivities(

@@ -8,7 +8,8 @@ otherwise set the step (a torque ripple's power is quicker than anything that mo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,7 @@ from hdsim.simulation.spans import cuts, stops
 if TYPE_CHECKING:
     from hdsim.drive.model import Model
     from hdsim.simulation.rosenbrock import Beside
+    from hdsim.simulation.solvers import Integration
 
 Array = NDArray[np.float64]
 
@@ -31,6 +33,19 @@ Array = NDArray[np.float64]
 #: moves as no drive does (chosen: most effects take up to three times those of the plain drive, while a curve
 #: over the twist that had become a cliff took 10,000 times, and two minutes).
 FAR_MORE = 100.0
+
+
+@dataclass(frozen=True)
+class SetFree:
+    """A time at which the states of a model, and of those beside it, jump.
+
+    Attributes:
+        at_s: the time, s, before the last that is sampled.
+        jumps: of the model's states and those of each of the others, shape (1 + others, states).
+    """
+
+    at_s: float
+    jumps: Array
 
 
 def sample(
@@ -72,6 +87,7 @@ def samples_beside(
     rtol: float = 1e-6,
     atol: float | Array | None = None,
     steps: list[int] | None = None,
+    set_free: SetFree | None = None,
 ) -> list[dict[str, Array]]:
     """Run a model, and others that differ so little from it that they may be linearised beside it.
 
@@ -86,6 +102,7 @@ def samples_beside(
         rtol: likewise.
         atol: likewise.
         steps: likewise.
+        set_free: when the states of the models jump, and by how much.
 
     Returns:
         What ``sample`` returns, of the model and of each other one.
@@ -104,23 +121,30 @@ def samples_beside(
     grid = _reaching_back(times, max(each.memory for each in observers)) if sensors else times
 
     system, end = model.system, float(times[-1])
-    spans = cuts(model.signals, end)
-    beside = None
-    if others:
-        beside = _beside(model, others)
-    found = rodas4_through(
-        system,
-        spans,
-        system.y0,
-        grid,
-        rtol=rtol,
-        atol=rtol * system.scale if atol is None else atol,
-        stops=stops(model, end),
-        inside_at=layout.INSIDE,
-        guard=speed_guard(model),
-        others=beside,
-        most_steps=FAR_MORE * max(steps[0], len(grid)) if steps else np.inf,
-    )
+    jumps_at = [] if set_free is None else [np.array([set_free.at_s])]
+    spans = cuts(model.signals, end, *jumps_at)
+
+    def through(spans: Array, y0: Array, near: Array, grid: Array, first_step: float | None) -> Integration:
+        return rodas4_through(
+            system,
+            spans,
+            y0,
+            grid,
+            rtol=rtol,
+            atol=rtol * system.scale if atol is None else atol,
+            stops=stops(model, end),
+            inside_at=layout.INSIDE,
+            guard=speed_guard(model),
+            first_step=first_step,
+            others=_beside(model, others, near) if others else None,
+            most_steps=FAR_MORE * max(steps[0], len(grid)) if steps else np.inf,
+        )
+
+    near = np.array([other.system.y0 for other in others]).reshape(len(others), system.size)
+    if set_free is None:
+        found = through(spans, system.y0, near, grid, None)
+    else:
+        found = _set_free(through, set_free, spans, system.y0, near, grid)
     if steps is not None and found.statistics is not None:
         steps.append(found.statistics.steps + found.statistics.rejected)
     if not found.success:
@@ -167,7 +191,33 @@ def alike(model: Model, other: Model, end_s: float) -> bool:
     )
 
 
-def _beside(model: Model, others: Sequence[Model]) -> Beside:
+def _set_free(
+    through: Callable[[Array, Array, Array, Array, float | None], Integration],
+    set_free: SetFree,
+    spans: Array,
+    y0: Array,
+    near: Array,
+    grid: Array,
+) -> Integration:
+    """The integration up to where the states jump, and from there on, as one."""
+    at_s, jumps = set_free.at_s, set_free.jumps
+    early = grid < at_s
+    first = through(spans[spans <= at_s], y0, near, np.append(grid[early], at_s), None)
+    if not first.success:
+        return first
+    there = first.y[:, -1]
+    beside = first.beside[:, -1] if first.beside is not None else np.zeros((0, len(there)))
+    near = there + beside + jumps[1:]
+    second = through(spans[spans >= at_s], there + jumps[0], near, grid[~early], first.next_step)
+    if first.statistics is not None and second.statistics is not None:
+        second.statistics.add(first.statistics)
+    second.t, second.y = np.append(first.t[:-1], second.t), np.hstack([first.y[:, :-1], second.y])
+    if first.beside is not None and second.beside is not None:
+        second.beside = np.concatenate([first.beside[:, :-1], second.beside], axis=1)
+    return second
+
+
+def _beside(model: Model, others: Sequence[Model], near: Array) -> Beside:
     """Numbers of the models beside one, and which of them share all but their elements and inertias with it.
 
     Coordinates, kinematic error and mesh, the dearest part where it has teeth, see the angles, signals and
@@ -188,7 +238,7 @@ def _beside(model: Model, others: Sequence[Model]) -> Beside:
         integers[:, layout.GIVEN] = (reals[:, seen] == system.reals[seen]).all(axis=1)
     return Beside(
         reals,
-        np.stack([other.system.y0 for other in others]),
+        near,
         integers,
         integers[:, layout.GIVEN] != 0,
     )

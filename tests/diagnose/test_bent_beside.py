@@ -12,7 +12,8 @@ import hdsim
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.locate import locate
 from hdsim.diagnosis.name import name_effect
-from hdsim.diagnosis.search import Search, Stage, _one_more
+from hdsim.diagnosis.passes import Search, Stage
+from hdsim.diagnosis.search import _one_more
 from hdsim.diagnosis.traces import screen
 from hdsim.estimate.fit import sharpened
 from hdsim.estimate.opening import bench_for

@@ -10,7 +10,7 @@ from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.collect import _fell, collect
 from hdsim.diagnosis.decide import decide
 from hdsim.diagnosis.locate import SHARP, locate
-from hdsim.diagnosis.search import Search, Stage
+from hdsim.diagnosis.passes import Search, Stage
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.estimate.found import Gap
 from hdsim.estimate.refit import together

@@ -1,0 +1,85 @@
+"""Samples that count no more once an effect has shown them, and what a search begins anew with then.
+
+A vibration at the beginning of a record, or a shaft at rest, may be what the first effects were named for,
+and has bent the base in any case. So all begins anew without it, but for a model that explains all that is
+left without bending the base, as it did beside those samples: nothing can be clearly likelier (``is_all``).
+"""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+
+import numpy as np
+
+from hdsim.diagnosis.again import left_of
+from hdsim.diagnosis.given import is_all
+from hdsim.diagnosis.name import Named
+from hdsim.diagnosis.passes import Search
+from hdsim.diagnosis.rest import hear_rest
+from hdsim.diagnosis.swing import hear_swing, let_swing
+from hdsim.estimate.bench import Bench
+from hdsim.estimate.fit import Fit, sharpened
+from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.refit import as_far_as_promised, reweigh, together
+from hdsim.estimate.series import Counted
+
+
+def heard(bench: Bench, before: Fit, found: Fit) -> bool:
+    """Whether the effect found last has shown samples that do not count, or a shaft that sticks.
+
+    Args:
+        bench: the measured series; their masks and predictors are changed where that is so.
+        before: the model before that effect was found.
+        found: the model with it; where its load swings at the beginning of a record, it does from there on.
+    """
+    counted = Counted(bench.series)
+    # What it explained no longer counts as noise.
+    bench.weigh(bench.residuals(found.predictions))
+    free = let_swing(bench, found)
+    if free is not found:
+        found.become(free)
+        reweigh(bench, found)
+    if hear_swing(bench, found) or hear_rest(bench, before, found):
+        return True
+    if free is found:
+        counted.weigh_as_before()
+    return False
+
+
+def begun_anew(bench: Bench, found: Search, *models: tuple[Fit, list[Named]]) -> Search:
+    """The search once samples count no more, with the first of some models that explains what is left.
+
+    Args:
+        bench: the measured series, without those samples.
+        found: the search.
+        models: fits beside those samples, with the names of their effects.
+    """
+    found.anew = True
+    for model, names in models:
+        if not names:
+            continue
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            on = as_far_as_promised(bench, sharpened(bench, together(bench, model, rough=True)))
+            if is_all(bench, on):
+                found.fit, found.named, found.kept = on, list(names), True
+                break
+    return found
+
+
+def gone_on_with(bench: Bench, kept: Search) -> Search:
+    """A search that goes on without those samples, with what explains the others.
+
+    Args:
+        bench: the measured series, without those samples.
+        kept: the search beside them.
+    """
+    current = together(bench, kept.fit, rough=True)
+    reweigh(bench, current)
+    current = sharpened(bench, current)
+    # What was seen beside those samples has no place any more.
+    stages = [
+        replace(one, screening=one.screening and replace(one.screening, seen={}), over_given=None)
+        for one in kept.stages
+    ]
+    return Search(current, left_of(bench, current), stages, kept.named, thorough=kept.thorough)
