@@ -2,7 +2,8 @@
 
 A vibration at the beginning of a record, or a shaft at rest, may be what the first effects were named for,
 and has bent the base in any case. So all begins anew without it, but for a model that explains all that is
-left without bending the base, as it did beside those samples: nothing can be clearly likelier (``is_all``).
+left without bending the base, and better than what was tried in its place: nothing can be clearly likelier
+(``is_all``).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdsim.diagnosis.again import left_of
-from hdsim.diagnosis.given import is_all
+from hdsim.diagnosis.given import AT_STAKE, is_all
 from hdsim.diagnosis.name import Named
 from hdsim.diagnosis.passes import Search
 from hdsim.diagnosis.rest import hear_rest
@@ -21,7 +22,7 @@ from hdsim.diagnosis.swing import hear_swing, let_swing
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.refit import as_far_as_promised, reweigh, together
+from hdsim.estimate.refit import as_far_as_promised, reweigh, together, unlikelihood
 from hdsim.estimate.series import Counted
 
 
@@ -61,10 +62,21 @@ def begun_anew(bench: Bench, found: Search, *models: tuple[Fit, list[Named]]) ->
             continue
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             on = as_far_as_promised(bench, sharpened(bench, together(bench, model, rough=True)))
-            if is_all(bench, on):
+            if is_all(bench, on) and not any(_may_be_another(bench, on, one) for one in names):
                 found.fit, found.named, found.kept = on, list(names), True
                 break
     return found
+
+
+def _may_be_another(bench: Bench, on: Fit, named: Named) -> bool:
+    """Whether one of the laws that were tried in a name's place is not clearly less likely now."""
+    least = unlikelihood(bench, on, on) + AT_STAKE
+    for other in named.alternatives.values():
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            there = together(bench, other, rough=True)
+            if unlikelihood(bench, there, on) < least:
+                return True
+    return False
 
 
 def gone_on_with(bench: Bench, kept: Search) -> Search:

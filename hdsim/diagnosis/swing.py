@@ -68,7 +68,11 @@ def let_swing(bench: Bench, found: Fit) -> Fit:
             freed = together(bench, replace(found, state=state, predictions=predictions), rough=True)
             if _beyond(bench, freed) < (1.0 - MUCH) * before:
                 freed = as_far_as_promised(bench, sharpened(bench, freed))
-            if _beyond(bench, freed) < (1.0 - MOST) * before:
+            # A fit that is carried on leaves less in any case; of that the swing must do most, too.
+            left, swings, bench.swings = _beyond(bench, freed), bench.swings, {}
+            held = bench.power(bench.predict(replace(freed.state, swings={}))) - bench.noise_power
+            if left < (1.0 - MOST) * min(before, held):
+                bench.swings = swings
                 return freed
     bench.swings = {}
     return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from hdsim.estimate.predict import COARSE_RTOL, PredictionError, Predictor
 from hdsim.estimate.records import Array, Mask
 from hdsim.estimate.series import Series
 from hdsim.estimate.still import fresh
-from hdsim.estimate.swings import Swings, swing_columns, swung_on, without_swings
+from hdsim.estimate.swings import Swings, swing_columns, without_swings
 
 if TYPE_CHECKING:
     from hdsim.estimate.state import State
@@ -33,8 +32,7 @@ STRETCHES = 9
 TURNS, SEEN = 0.1, 0.25
 #: Time at the start of a record that is not compared: the model's own oscillation may not have died away, s.
 SETTLE_S = 0.05
-#: Share of the residual that counts as noise beside the channel's noise, so that a channel with little
-#: noise does not alone decide.
+#: Share of the residual that counts as noise, so that a channel with little noise does not alone decide.
 MODEL_NOISE = 0.1
 
 
@@ -51,9 +49,8 @@ class Bench:
         self, training: Sequence[Predictor], holdout: Sequence[Predictor] = (), zeros: Zeros = "campaign"
     ) -> None:
         self.predictors = [*training, *holdout]
-        self.training, self.zeros = len(training), zeros
+        self.training, self.zeros, self.blocks = len(training), zeros, 0
         self.series: list[Series] = []
-        self.blocks = 0
         #: Predictions with the model's own flanks, then with others (``flanks.hear_flanks``).
         self.redrawn: list[list[Array]] = []
         #: Time at the beginning of records that does not count, s (``hdsim.estimate.beginning``).
@@ -246,19 +243,12 @@ class Bench:
 
     def _without(self, values: Sequence[Array], *, drift: bool) -> list[Array]:
         """Residuals or changes without what zeros of sensors and swings of loads may do."""
-        return without_swings(self.series, self._centred(values, drift=drift), self.swings)
+        return without_swings(self.series, self.centred(values, drift=drift), self.swings)
 
-    def _centred(self, values: Sequence[Array], *, drift: bool) -> list[Array]:
+    def centred(self, values: Sequence[Array], *, drift: bool = False) -> list[Array]:
         """Residuals or changes without what zeros of sensors may do."""
         offsets = offsets_of(self.series, values, self.zeros, drift=drift)
         return [value - offset for value, offset in zip(values, offsets, strict=True)]
-
-    def swung_on(self, state: State, predictions: Sequence[Array]) -> State:
-        """The model with the swings of the training records' loads that leave least beside these."""
-        if not self.swings:
-            return state
-        rest = self._centred(self.apart(predictions), drift=False)
-        return replace(state, swings=swung_on(self.series, rest, self.swings, state.swings))
 
     def apart(self, predictions: Sequence[Array]) -> list[Array]:
         """Measured less predicted; empty where nothing is predicted."""

@@ -12,6 +12,7 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.numbers import Free, scaled
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
+from hdsim.estimate.swings import swung_on
 
 #: Largest step of finite differences in the logarithm of a number, and of a stiffness or a shape, in which
 #: the model is further from linear; change of the whitened predictions, root mean square, for which a smaller
@@ -177,8 +178,9 @@ class Measured:
         if self.bench.swings and float(rest @ rest) < self._nearest:
             # From there on loads swing as they had best.
             self._nearest = float(rest @ rest)
-            base = self.bench.swung_on(self.swung(x).base, predictions)
-            self.vector = replace(self.vector, base=base)
+            base, apart = self.swung(x).base, self.bench.centred(self.bench.apart(predictions))
+            swings = swung_on(self.bench.series, apart, self.bench.swings, base.swings)
+            self.vector = replace(self.vector, base=replace(base, swings=swings))
         return rest
 
     def swung(self, x: Array) -> Vector:

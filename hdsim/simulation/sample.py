@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -136,7 +136,7 @@ def samples_beside(
             inside_at=layout.INSIDE,
             guard=speed_guard(model),
             first_step=first_step,
-            others=_beside(model, others, near) if others else None,
+            others=replace(_beside(model, others), y0=near) if others else None,
             most_steps=FAR_MORE * max(steps[0], len(grid)) if steps else np.inf,
         )
 
@@ -217,7 +217,7 @@ def _set_free(
     return second
 
 
-def _beside(model: Model, others: Sequence[Model], near: Array) -> Beside:
+def _beside(model: Model, others: Sequence[Model]) -> Beside:
     """Numbers of the models beside one, and which of them share all but their elements and inertias with it.
 
     Coordinates, kinematic error and mesh, the dearest part where it has teeth, see the angles, signals and
@@ -238,7 +238,7 @@ def _beside(model: Model, others: Sequence[Model], near: Array) -> Beside:
         integers[:, layout.GIVEN] = (reals[:, seen] == system.reals[seen]).all(axis=1)
     return Beside(
         reals,
-        near,
+        np.stack([other.system.y0 for other in others]),
         integers,
         integers[:, layout.GIVEN] != 0,
     )

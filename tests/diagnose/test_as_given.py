@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from diagnose_bench import bent, rigid_record, scenario
 
+from hdsim.diagnosis import anew
 from hdsim.diagnosis import search as searching
 from hdsim.diagnosis.given import AT_STAKE, is_all
 from hdsim.diagnosis.point import as_given
@@ -116,8 +117,10 @@ def test_what_no_longer_counts_beside_a_first_effect_is_heard_before_the_given_i
     monkeypatch.setattr(searching, "over_the_given", lambda *_: asked.append("given"))
     monkeypatch.setattr(searching, "is_all", lambda *_: False)
     monkeypatch.setattr(searching, "nothing_but_flanks", lambda *_: False)
-    monkeypatch.setattr(searching, "hear_swing", lambda *_: False)
-    monkeypatch.setattr(searching, "hear_rest", rests)
+    monkeypatch.setattr(anew, "let_swing", lambda _, now: now)
+    monkeypatch.setattr(anew, "hear_swing", lambda *_: False)
+    monkeypatch.setattr(anew, "hear_rest", rests)
+    monkeypatch.setattr(anew, "is_all", lambda *_: False)
     counted = Counted(bench.series)
     for series in bench.series:
         series.sigma *= 3.0

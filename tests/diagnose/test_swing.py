@@ -9,14 +9,14 @@ from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis.starts import starts
-from hdsim.diagnosis.swing import hear_swing
+from hdsim.diagnosis.swing import hear_swing, let_swing
 from hdsim.diagnosis.workflow import diagnose
 from hdsim.effects import catalogue
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.fit import Fit, at_present, fit
+from hdsim.estimate.fit import Fit, at_present, fit, sharpened
 from hdsim.estimate.opening import bench_for
 from hdsim.estimate.records import Record
-from hdsim.estimate.refit import refit
+from hdsim.estimate.refit import as_far_as_promised, refit
 from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 
@@ -55,6 +55,24 @@ def with_the_error(begins_s: float) -> tuple[Bench, Fit]:
     return bench, one
 
 
+def carried_on(begins_s: float) -> tuple[Bench, Fit]:
+    """The same near its end, weighed by what it leaves, as a search has it."""
+    bench, found = with_the_error(begins_s)
+    found = as_far_as_promised(bench, sharpened(bench, found))
+    bench.weigh(bench.residuals(found.predictions))
+    return bench, found
+
+
+def times_noise(bench: Bench, predictions: list[np.ndarray]) -> float:
+    """What is left of the output's angle, over its noise."""
+    (rest,) = (
+        rest[series.train] / series.noise
+        for series, rest in zip(bench.series, bench.residuals(predictions), strict=True)
+        if series.channel == "output_angle"
+    )
+    return float(np.sqrt(np.mean(rest**2)))
+
+
 @pytest.mark.slow
 def test_a_vibration_behind_an_effect_no_longer_counts():
     bench, found = with_the_error(FASTEST_S)
@@ -63,6 +81,28 @@ def test_a_vibration_behind_an_effect_no_longer_counts():
     assert before < 0.1 < bench.begins_s[0]
     first = min(bench.time_of(s)[s.train][0] for s in bench.series)
     assert first >= bench.begins_s[0]
+
+
+@pytest.mark.slow
+def test_a_load_that_swings_behind_an_effect_does_so_in_the_model():
+    bench, found = carried_on(FASTEST_S)
+    counted = [s.train.copy() for s in bench.series]
+    before = times_noise(bench, found.predictions)
+    free = let_swing(bench, found)
+    assert before > 2.0
+    assert times_noise(bench, free.predictions) < 1.1
+    assert list(bench.swings) == [0]
+    assert all(np.array_equal(s.train, rows) for s, rows in zip(bench.series, counted, strict=True))
+    # What is taken out beside has hardly anything left to do.
+    bench.swings = {}
+    assert times_noise(bench, bench.predict(free.state)) < 1.1
+
+
+@pytest.mark.slow
+def test_a_record_that_begins_at_rest_has_no_load_that_swings():
+    bench, found = carried_on(AT_REST_S)
+    assert let_swing(bench, found) is found
+    assert bench.swings == {}
 
 
 @pytest.mark.slow
