@@ -21,6 +21,7 @@ from hdsim.diagnosis.rest import hear_rest
 from hdsim.diagnosis.swing import hear_swing, let_swing
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
+from hdsim.estimate.free_swing import swinging
 from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.refit import as_far_as_promised, reweigh, together, unlikelihood
 from hdsim.estimate.series import Counted
@@ -40,11 +41,13 @@ def heard(bench: Bench, before: Fit, found: Fit) -> bool:
     free = let_swing(bench, found)
     if free is not found:
         found.become(free)
-        reweigh(bench, found)
     if hear_swing(bench, found) or hear_rest(bench, before, found):
         return True
-    if free is found:
-        counted.weigh_as_before()
+    now = np.array([series.sigma for series in bench.series])
+    counted.weigh_as_before()
+    if free is not found:
+        then = np.array([series.sigma for series in bench.series])
+        found.columns *= (now / then)[bench.stacked_series()][:, None]
     return False
 
 
@@ -86,7 +89,10 @@ def gone_on_with(bench: Bench, kept: Search) -> Search:
         bench: the measured series, without those samples.
         kept: the search beside them.
     """
+    kept.kept = False  # once: it may turn out that they are needless
     current = together(bench, kept.fit, rough=True)
+    if current.state.swings:
+        current.state, current.predictions = swinging(bench, current.state, current.predictions)
     reweigh(bench, current)
     current = sharpened(bench, current)
     # What was seen beside those samples has no place any more.
