@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hdsim.diagnosis.given import AT_STAKE
 from hdsim.estimate.beginning import EARLY, hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
@@ -68,10 +69,11 @@ def let_swing(bench: Bench, found: Fit) -> Fit:
             freed = together(bench, replace(found, state=state, predictions=predictions), rough=True)
             if _beyond(bench, freed) < (1.0 - MUCH) * before:
                 freed = as_far_as_promised(bench, sharpened(bench, freed))
-            # A fit that is carried on leaves less in any case; of that the swing must do most, too.
-            left, swings, bench.swings = _beyond(bench, freed), bench.swings, {}
+            left, rest = _beyond(bench, freed), bench.stacked(bench.residuals(freed.predictions))
+            # A fit that is carried on leaves less in any case; the swing must clearly be in it.
+            swings, bench.swings = bench.swings, {}
             held = bench.power(bench.predict(replace(freed.state, swings={}))) - bench.noise_power
-            if left < (1.0 - MOST) * min(before, held):
+            if left < (1.0 - MOST) * before and left < held - AT_STAKE * bench.sample_power(rest):
                 bench.swings = swings
                 return freed
     bench.swings = {}
