@@ -13,13 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdsim.diagnosis.given import AT_STAKE
 from hdsim.estimate.beginning import EARLY, hear_beginning
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.free_swing import swinging
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.refit import MUCH, as_far_as_promised, together
+from hdsim.estimate.refit import MUCH, NEARLY, as_far_as_promised, together
 from hdsim.estimate.series import Counted
 
 #: Part of what a model leaves beyond the noise that is most of it.
@@ -54,7 +53,9 @@ def hear_swing(bench: Bench, found: Fit) -> bool:
 
 
 def let_swing(bench: Bench, found: Fit) -> Fit:
-    """The model with loads that swing where records begin, where it leaves less than half of what it did.
+    """The model with loads that swing where records begin, where that leaves less than half as much.
+
+    It must leave no more than twice the noise's power, too.
 
     Args:
         bench: the measured series, weighed; what is taken out of them is changed where that is so.
@@ -66,18 +67,24 @@ def let_swing(bench: Bench, found: Fit) -> Fit:
     with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
         state, predictions = swinging(bench, found.state, found.predictions)
         if bench.swings:
-            freed = together(bench, replace(found, state=state, predictions=predictions), rough=True)
-            if _beyond(bench, freed) < (1.0 - MUCH) * before:
-                freed = as_far_as_promised(bench, sharpened(bench, freed))
-            left, rest = _beyond(bench, freed), bench.stacked(bench.residuals(freed.predictions))
-            # A fit that is carried on leaves less in any case; the swing must clearly be in it.
-            swings, bench.swings = bench.swings, {}
-            held = bench.power(bench.predict(replace(freed.state, swings={}))) - bench.noise_power
-            if left < (1.0 - MOST) * before and left < held - AT_STAKE * bench.sample_power(rest):
-                bench.swings = swings
-                return freed
+            free = _carried_on(bench, replace(found, state=state, predictions=predictions), before)
+            left, swings, bench.swings = _beyond(bench, free), bench.swings, {}
+            # A fit that is carried on leaves less in any case; of one that is far off nobody knows the swing.
+            if left < min((1.0 - MOST) * before, (NEARLY - 1.0) * bench.noise_power):
+                held = _carried_on(bench, found, before)
+                if left < (1.0 - MOST) * _beyond(bench, held):
+                    bench.swings = swings
+                    return free
     bench.swings = {}
     return found
+
+
+def _carried_on(bench: Bench, found: Fit, before: float) -> Fit:
+    """The model carried on, as far as it promises where a first step leaves much less than ``before``."""
+    on = together(bench, found, rough=True)
+    if _beyond(bench, on) < (1.0 - MUCH) * before:
+        on = as_far_as_promised(bench, sharpened(bench, on))
+    return on
 
 
 def _beyond(bench: Bench, found: Fit) -> float:
