@@ -47,7 +47,7 @@ def heard(bench: Bench, before: Fit, found: Fit) -> bool:
     counted.weigh_as_before()
     if free is not found:
         then = np.array([series.sigma for series in bench.series])
-        found.columns *= (now / then)[bench.stacked_series()][:, None]
+        found.weigh((now / then)[bench.stacked_series()])
     return False
 
 

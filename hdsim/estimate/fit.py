@@ -69,6 +69,13 @@ class Fit:
         first = len(self.frees) + sum(widths[:effect])
         return slice(first, first + widths[effect])
 
+    def weigh(self, change: Array) -> None:
+        """Give the sensitivities other weights: ``change``, shape (rows,), times those that they have."""
+        if self.columns.size:
+            self.columns *= change[:, None]
+        if self.beside is not None:
+            self.beside = self.beside[0] * change[:, None], self.beside[1]
+
     def become(self, other: Fit) -> None:
         """Take over all that another fit of the same numbers found."""
         for each in fields(self):

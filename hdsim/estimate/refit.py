@@ -335,11 +335,8 @@ def reweigh(bench: Bench, found: Fit) -> float:
     Returns:
         Largest factor by which a training series' weight has risen.
     """
-    change = _weights_risen(bench, found)[bench.stacked_series()][:, None]
-    if found.columns.size:
-        found.columns *= change
-    if found.beside is not None:
-        found.beside = found.beside[0] * change, found.beside[1]
+    change = _weights_risen(bench, found)[bench.stacked_series()]
+    found.weigh(change)
     return float(np.max(change, initial=1.0))
 
 
