@@ -5,7 +5,8 @@
 The pool runs in a clone of this repository at REVISION, with the packages that are installed here; it makes
 RUNS (64; an eighth with all teeth) short runs that differ in the load's inertia, and keeps two channels, as
 the ensemble of ``hdsim.simulate_all`` does. Both begin with each run's scenario as plain data. Wall seconds,
-medians of the rounds' ratios, for runs of several lengths.
+medians of the rounds' ratios, for runs of several lengths. This file imports nothing that came after the
+pools of then, for they import it.
 """
 
 from __future__ import annotations
@@ -100,8 +101,9 @@ def main(revision: str, runs: int) -> None:
                 before, now = [], []
                 for number in range(ROUNDS + 1):
                     spent = pool(mesh, count, duration_s)
+                    asked = moves(mesh, count, duration_s)
                     began = time.perf_counter()
-                    scenarios = [Scenario.model_validate(data) for data in moves(mesh, count, duration_s)]
+                    scenarios = [Scenario.model_validate(data) for data in asked]
                     hdsim.simulate_all(scenarios, CHANNELS, threads=1)
                     if number:  # the first round compiles and fills caches
                         before.append(spent)
