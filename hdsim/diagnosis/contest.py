@@ -117,7 +117,7 @@ def contest(
     for name in further:
         tell(f"fitting {name} in full")
         keep(name, full_fits(bench, base, best[name][1]))
-    _look_alikes(bench, base, shortlist, best, further, keep, tell)
+    _look_alikes(bench, base, shortlist, best, [*full, *further], keep, tell)
     first = min(best, key=lambda name: best[name][0])
     if first in further:
         enough = LEFT_IN * min(known_power, best[first][0])

@@ -21,9 +21,9 @@ from hdsim.estimate.bench import Bench
 from hdsim.estimate.covariance import correlation
 from hdsim.estimate.fit import Fit
 from hdsim.estimate.predict import PredictionError
-from hdsim.estimate.records import Mask
+from hdsim.estimate.records import Array, Mask
 from hdsim.estimate.refit import REACHED, at_its_end, together
-from hdsim.estimate.series import Counted
+from hdsim.estimate.series import Counted, Series
 from hdsim.estimate.standstill import (
     CLEARLY,
     count_only,
@@ -33,6 +33,10 @@ from hdsim.estimate.standstill import (
     missed_at_rest,
     while_turning,
 )
+
+#: Part of what the model before missed at rest that one with an effect more must miss still for that effect
+#: not to be what tells of rests (chosen: most of it).
+TOLD = 0.5
 
 
 def hear_rest(bench: Bench, before: Fit, found: Fit) -> bool:
@@ -85,6 +89,57 @@ def only_sticks(bench: Bench, before: Fit, found: Fit, *, whole: bool = False) -
     return likelier
 
 
+def sticks_beside(bench: Bench, before: Fit, found: Fit, traces: Sequence[Array]) -> bool:
+    """Leave rests out where the effect that was found tells nothing of them, nor could any other one.
+
+    Args:
+        bench: the measured series; masks are changed.
+        before: the model before that effect was found.
+        found: the model with it.
+        traces: of the effects that might be missing, whitened, shape (rows, k) each.
+    """
+    turning = while_turning(bench)
+    if not (has_a_sign(found.state) and before.state.drive.friction.sticks):
+        return False
+    if not missed_at_rest(bench, found.predictions, turning):
+        return False
+    ours, first = bench.residuals(found.predictions), bench.residuals(before.predictions)
+    owner = bench.stacked_series()
+    designs = [np.zeros((len(owner), 1)), *traces]
+    odds = np.zeros(len(designs))
+    for k, (series, rows) in enumerate(zip(bench.series, turning, strict=True)):
+        turns, rests = rows[series.train], ~rows[series.train]
+        if not len(ours[k]) or not turns.any() or not rests.any():
+            continue
+        left, blocks = ours[k][series.train], series.block[series.train]
+        if np.sum(left[rests] ** 2) < TOLD * np.sum(first[k][series.train][rests] ** 2):
+            return False
+        power = max(float(np.mean(left[turns] ** 2)), series.noise**2)
+        turned, rested = (correlation(left[each], blocks[each]) for each in (turns, rests))
+        anything = _anything(found, series, series.train, power)
+        for j, columns in enumerate(designs):
+            own = columns[owner == k]
+            theirs = left - own @ np.linalg.lstsq(own, left, rcond=1e-6)[0]
+            apart = np.sum(theirs[turns] ** 2) - np.sum(left[turns] ** 2)
+            gains = np.sum(_gains(left[rests], theirs[rests], power, anything))
+            odds[j] += 0.5 * apart / (power * turned) + gains / rested
+    return bool(odds.min() > CLEARLY) and count_only(bench, turning)
+
+
+def _anything(found: Fit, series: Series, counted: Mask, power: float) -> float:
+    """Likelihood of any torque up to what breaks a shaft loose over that of one that is as predicted."""
+    friction, peak = found.state.drive.friction, np.sqrt(2.0 * np.pi * power)
+    load = float(np.max(np.abs(series.measured[counted])))
+    breaks = friction.coulomb_nm + friction.load_coefficient * load
+    return float(peak / (2.0 * breaks + peak))
+
+
+def _gains(ours: Array, theirs: Array, power: float, anything: float) -> Array:
+    """Log-odds of samples at rest where a shaft sticks, against a model that predicts them, shape (n,)."""
+    as_predicted = np.exp(-0.5 * ours**2 / power)
+    return np.asarray(0.5 * theirs**2 / power + np.log(0.5 * as_predicted + 0.5 * anything))
+
+
 def _likelier_at_rest(bench: Bench, alone: Fit, found: Fit, trained: Sequence[Mask]) -> float:
     """Logarithm of the odds of a model that only sticks against one with an effect more.
 
@@ -98,7 +153,6 @@ def _likelier_at_rest(bench: Bench, alone: Fit, found: Fit, trained: Sequence[Ma
         trained: samples that counted there, of each series, shape (n,) each.
     """
     odds = 0.0
-    friction = alone.state.drive.friction
     for series, ours, theirs, before in zip(
         bench.series,
         bench.residuals(alone.predictions),
@@ -115,12 +169,6 @@ def _likelier_at_rest(bench: Bench, alone: Fit, found: Fit, trained: Sequence[Ma
         odds += 0.5 * float(np.sum(apart[turns])) / worth
         if not rests.any():
             continue
-        breaks = friction.coulomb_nm + friction.load_coefficient * float(
-            np.max(np.abs(series.measured[before]))
-        )
-        peak = np.sqrt(2.0 * np.pi * power)
-        as_predicted = np.exp(-0.5 * ours[rests] ** 2 / power)
-        anything = peak / (2.0 * breaks + peak)
-        gains = 0.5 * theirs[rests] ** 2 / power + np.log(0.5 * as_predicted + 0.5 * anything)
+        gains = _gains(ours[rests], theirs[rests], power, _anything(alone, series, before, power))
         odds += float(np.sum(gains)) / correlation(theirs[rests], series.block[rests])
     return odds

@@ -28,7 +28,7 @@ from hdsim.diagnosis.locate import SHARP, locate
 from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
 from hdsim.diagnosis.passes import Search, Stage
 from hdsim.diagnosis.point import from_where_it_was
-from hdsim.diagnosis.rest import only_sticks
+from hdsim.diagnosis.rest import only_sticks, sticks_beside
 from hdsim.diagnosis.revise import base_alone, revised
 from hdsim.diagnosis.screen import LEVEL, Residual
 from hdsim.diagnosis.traces import ranked_anew, screen
@@ -165,6 +165,11 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         return None
     if len(found.named) > 1 and hopeless(bench, named.fit, named):
         return None
+    if not found.named and stage.screening is not None:
+        traces = [each.columns for one in stage.screening.ranked for each in (one, *one.others)]
+        if sticks_beside(bench, current, named.fit, traces):
+            found.anew, stage.named = True, named
+            return named.fit
     current = _finished(bench, base, found, named, during)
     if not found.named and not is_all(bench, current):
         if heard(bench, found.fit, current):

@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from diagnose_bench import servo_with_arm
 from noisy import noisy
 
 import hdsim
@@ -53,3 +54,23 @@ def test_nothing_is_named_where_teeth_are_all_there_is():
     gap = verdict.gap["output_angle"]
     # The base's own teeth are the plant's: nothing but noise is left from the start.
     assert gap.before < 1.1 * gap.noise
+
+
+@pytest.mark.slow
+def test_a_loop_is_named_beside_a_rest_before_another_effect_is_sought():
+    """The drive holds at its reversals. Seen before that was heard: Duhem's law, then others beside it."""
+    run = {"sample_rate_hz": 1000.0}
+    plant = servo_with_arm({"model": "teeth"}, {"torsional_hysteresis_maxwell": {}}, **run)
+    record = noisy(hdsim.simulate(plant), NOISE, seed=0)
+    steps = []
+    base = servo_with_arm({"model": "tabulated"}, {}, **run)
+    verdict = diagnose([record], base, on_step=steps.append).verdict
+    (named,) = verdict.effects
+    assert named.name == "torsional_hysteresis_maxwell"
+    assert named.settings["slip_torque_nm"] == pytest.approx(2.0, rel=0.05)
+    gap = verdict.gap["output_angle"]
+    assert gap.before > 10.0 * gap.noise
+    assert gap.after < 1.05 * gap.noise
+    # As given, and once more without the rests: that is all there is to screen.
+    assert steps.count("screening the catalogue") == 2
+    assert "testing each effect again beside the others" not in steps
