@@ -53,7 +53,7 @@ test: checked
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10 -m "not study"
 
 test-fast: checked
-	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow"
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow and not study"
 
 test-studies: checked
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal --durations=10 -m study

@@ -38,7 +38,8 @@ def traces(
             continue
         size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
         if size > 0 and not wanted / FITTING < size < wanted * FITTING:
-            factor = float(np.clip(wanted / size, 1e-3, 1e5))
+            # A stronger one than is plausible may be no drive: stiffness all round that is more than its own.
+            factor = min(float(np.clip(wanted / size, 1e-3, 1e5)), max(1.0, added.to_plausible(state.drive)))
             again[k] = replace(added, fitting=added.fitting.rescaled(factor))
     for (k, added), columns in zip(
         again.items(), designs(bench, state, predictions, list(again.values())), strict=True

@@ -107,6 +107,10 @@ class Periodic(Term):
         """The unit times the factor."""
         return replace(self, unit=self.unit * factor)
 
+    def strengths(self) -> Mapping[str, float]:
+        """As those of a harmonic."""
+        return self.harmonic(0).strengths()
+
     def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
         """Order, amplitude and phase of each item."""
         for k, order in enumerate(orders):

@@ -102,6 +102,10 @@ class Term:
         """The same term with a unit that is worth ``factor`` times as much."""
         raise NotImplementedError
 
+    def strengths(self) -> Mapping[str, float]:
+        """Fields that say how strong it is, with their values at coefficient 1; a compliance has none."""
+        return {}
+
     def orders_among(self, lines: Iterable[tuple[str, float]], most: int) -> tuple[float, ...] | None:
         """Orders that it reads from order spectra; None where it finds none and needs some.
 
@@ -186,6 +190,10 @@ class Amplitude(Term):
     def rescaled(self, factor: float) -> Self:
         """Every unit times the factor."""
         return replace(self, units={path: unit * factor for path, unit in self.units.items()})
+
+    def strengths(self) -> Mapping[str, float]:
+        """All that have a unit."""
+        return self.units
 
     def sized(self, ranges: Mapping[str, float]) -> Self:
         """The parts times the range."""
@@ -292,6 +300,10 @@ class Harmonic(Term):
     def rescaled(self, factor: float) -> Self:
         """The unit times the factor."""
         return replace(self, unit=self.unit * factor)
+
+    def strengths(self) -> Mapping[str, float]:
+        """The amplitude."""
+        return {self.amplitude: self.unit}
 
     def report(self, found: Found, c: Values, covariance: Array, orders: Values, items: int) -> None:
         """Amplitude along the vector of the coefficients, phase as wide as their ellipse is seen."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -13,7 +14,7 @@ from pydantic import ValidationError
 from hdsim import number
 from hdsim.drive.parameters import ToothedMesh
 from hdsim.effects import catalogue
-from hdsim.effects._fitting import Fitting
+from hdsim.effects._fitting import Fitting, range_of, scales_of
 from hdsim.effects.table import Table
 from hdsim.estimate.predict import Candidate, PredictionError
 from hdsim.estimate.prescribed import LEAD_IN_S
@@ -84,6 +85,18 @@ class Added:
     def limits(self, path: str) -> tuple[float, float]:
         """Least and largest value that a field of the effect allows."""
         return number.limits(_metadata(self.effect, path))
+
+    def to_plausible(self, drive: Any) -> float:
+        """Factor on its units at which the first of them is as strong as is plausible in a drive."""
+        kind = catalogue()[self.effect]
+        scales = scales_of(drive.rated_torque_nm, drive.ratio, drive.torsion.stiffness_k1_nm_per_rad)
+        factor = math.inf
+        for term in self.fitting.terms:
+            for path, strength in term.strengths().items():
+                known = range_of(kind, path).plausible
+                if known is not None and strength:
+                    factor = min(factor, known.times(scales)[1] / abs(strength))
+        return factor
 
     def settings(self) -> dict[str, Any]:
         """Values of the effect's fields."""
