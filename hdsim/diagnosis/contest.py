@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -73,6 +73,7 @@ def contest(
     known = fitted if fitted is not None else {}
     names = [one.name for one in shortlist]
     best = {n: (bench.power(found.predictions), found) for n, (found, _) in known.items() if n in names}
+    shares = {one.name: one.share.share for one in shortlist}
     shortlist = [one for one in shortlist if one.name not in best]
 
     def keep(name: str, several: Iterable[Fit]) -> None:
@@ -117,7 +118,7 @@ def contest(
     for name in further:
         tell(f"fitting {name} in full")
         keep(name, full_fits(bench, base, best[name][1]))
-    _look_alikes(bench, base, shortlist, best, [*full, *further], keep, tell)
+    _look_alikes(bench, base, shortlist, best, [*full, *further], shares, keep, tell)
     first = min(best, key=lambda name: best[name][0])
     if first in further:
         enough = LEFT_IN * min(known_power, best[first][0])
@@ -215,26 +216,31 @@ def _look_alikes(
     shortlist: Sequence[Screened],
     best: dict[str, tuple[float, Fit]],
     full: Sequence[str],
+    shares: Mapping[str, float],
     keep: Callable[[str, Iterable[Fit]], None],
     tell: Callable[[str], object],
 ) -> None:
     """Fit what looks like the best anew from the numbers to which it led the base.
 
-    Of those that were fitted in full where the best misses the noise: what a re-fit bent to stand in for one
-    of them is back there, and the way of each from the bent numbers is a valley with turns: which is at its
-    end first need not be the better one. And laws of compliance that have not come as far: one as large as
-    the drive's own is found from few places.
+    Of those that were fitted in full, or whose traces explain more than the best's, where that misses the
+    noise: what a re-fit bent to stand in for one of them is back there, and the way of each from the bent
+    numbers is a valley with turns: which is at its end first need not be the better one. And laws of
+    compliance that have not come as far: one as large as the drive's own is found from few places.
     """
     name = min(best, key=lambda name: best[name][0])
     loss, leader = best[name]
     noise = bench.noise_power
-    in_full = full if name in full and len(full) > 1 and loss > REACHED * noise else []
+    missed = name in full and loss > REACHED * noise
     enough = (1.0 + LAGS) * max(loss, noise)
 
     def lags(one: Screened) -> bool:
         return one.added.fitting.in_series and best.get(one.name, (math.inf,))[0] > enough
 
-    rivals = [one for one in shortlist if confusable(one.name, name) and (one.name in in_full or lags(one))]
+    def may_lead(one: Screened) -> bool:
+        return one.name in full or one.share.share > shares[name]
+
+    alike = [one for one in shortlist if confusable(one.name, name)]
+    rivals = [one for one in alike if (missed and may_lead(one)) or lags(one)]
 
     def ended(there: Point, one: Screened) -> Iterator[Fit]:
         for each in _nearest_of_each(bench, _begun_from(bench, base, there, one)):
