@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from diagnose_bench import rigid_record, scenario
 
 from hdsim.diagnosis.again import left_of
 from hdsim.diagnosis.candidate_fits import Point, linear_fit
-from hdsim.diagnosis.contest import contest
+from hdsim.diagnosis.contest import _look_alikes, contest
 from hdsim.diagnosis.traces import screen
 from hdsim.estimate.fit import sharpened
 from hdsim.estimate.opening import bench_for
@@ -18,6 +19,7 @@ from hdsim.estimate.refit import refit, together
 from hdsim.estimate.state import state_of
 
 RATIO, WEIGHT = 100.0, 30.0
+DUHEM, MAXWELL = "torsional_hysteresis_duhem", "torsional_hysteresis_maxwell"
 #: A weight that the base's own arm (along the sine) can make up for in part only, N m at 60 degrees to it.
 HIDDEN, AHEAD = 8.0, math.radians(60.0)
 
@@ -78,3 +80,34 @@ def test_effects_that_are_there_move_along(opened):
     ((_, found, _),) = contest(bench, stuck, [one], left, None)
     best = together(bench, found)
     assert bench.power(found.predictions) < 1.05 * bench.power(best.predictions)
+
+
+@pytest.mark.parametrize(
+    ("left", "in_full", "share", "rivals"),
+    [
+        (2.4, True, 0.93, [MAXWELL]),  # its trace explains more, and its own fit has not come as far
+        (2.4, True, 0.91, []),
+        (2.4, False, 0.93, []),  # where the best led is not known well
+        (1.04, True, 0.93, []),  # the best has reached the noise
+    ],
+)
+def test_what_the_screen_ranks_above_the_best_is_fitted_from_where_that_led(
+    monkeypatch, left, in_full, share, rivals
+):
+    asked = []
+    monkeypatch.setattr(
+        "hdsim.diagnosis.contest._from_elsewhere",
+        lambda _bench, _base, _theta, _where, those, *_: asked.extend(one.name for one in those),
+    )
+    linear = SimpleNamespace(fitting=SimpleNamespace(in_series=False))
+    on_screen = {MAXWELL: share, "stribeck_friction": 0.99}  # the latter looks like neither
+    shortlist = [
+        SimpleNamespace(name=name, share=SimpleNamespace(share=part), added=linear)
+        for name, part in on_screen.items()
+    ]
+    best = {DUHEM: (left, SimpleNamespace(theta=np.zeros(0))), MAXWELL: (8.0, None)}
+    full = [DUHEM] if in_full else []
+    shares = on_screen | {DUHEM: 0.92}
+    bench, base = SimpleNamespace(noise_power=1.0), SimpleNamespace(frees=[])
+    _look_alikes(bench, base, shortlist, best, full, shares, None, None)
+    assert asked == rivals
