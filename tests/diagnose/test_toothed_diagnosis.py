@@ -8,25 +8,14 @@ from noisy import noisy
 
 import hdsim
 from hdsim.diagnosis.workflow import diagnose
-from hdsim.scenario import Scenario
 
 NOISE = {"motor_angle": 2e-5, "output_angle": 4e-6, "motor_torque": 6e-3}
 SECONDS = 3.5
 
 
 def drive(mesh, **effects):
-    sine = {"type": "sine", "amplitude_deg": 30.0, "frequency_hz": 0.5}
-    gains = {"position_gain_per_s": 30, "velocity_gain_nm_s_per_rad": 0.025}
-    controller = {"type": "cascade", **gains, "velocity_integral_gain_nm_per_rad": 0.5}
-    return Scenario.model_validate({
-        "drive": {"preset": "seed-2021", "mesh": {"model": mesh}},
-        "effects": effects,
-        "command": {
-            "motor": {"type": "position", "at": "output", "trajectory": sine, "controller": controller}
-        },
-        "load": {"inertia_kg_m2": 0.5, "gravity": {"mass_kg": 4.0, "centre_of_mass_m": 0.3}},
-        "run": {"duration_s": SECONDS, "sample_rate_hz": 1000.0, "rtol": 1e-5},
-    })  # fmt: skip
+    run = {"duration_s": SECONDS, "sample_rate_hz": 1000.0, "rtol": 1e-5}
+    return servo_with_arm({"model": mesh}, effects, frequency_hz=0.5, **run)
 
 
 def seen(plant):
