@@ -123,6 +123,15 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return dispatcher
 
 
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a function that becomes part of every compiled function that calls it.
+
+    A call hands over seven numbers for each array, most of them by way of the stack. For what a right-hand
+    side of 200 ns calls this is a third of its time.
+    """
+    return compiled(function, forceinline=True)
+
+
 def compiled_address(function: Callable[..., None], signature: Any) -> Any:
     """Compile a kernel to a C function; the result's ``address`` is valid as long as the result lives."""
     types = (signature.args, signature.return_type)

@@ -24,7 +24,7 @@ import numpy as np
 from numba import carray
 
 from hdsim._abi import call_system
-from hdsim._compile import compiled
+from hdsim._compile import compiled, inlined
 from hdsim.drive._elastic import evaluate_elastic
 from hdsim.drive._layout import (
     INSIDE,
@@ -42,9 +42,10 @@ from hdsim.kernel import (
 )
 
 _jit: Any = compiled
+_inline: Any = inlined
 
 
-@_jit
+@_inline
 def evaluate_arrays(t, y, integers, reals, scratch, want_jacobian, dy, jacobian, dfdt):  # type: ignore[no-untyped-def]
     """Right-hand side of either kind."""
     if integers[RING] == RIGID:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hdsim._abi import call_mesh
-from hdsim._compile import compiled
+from hdsim._compile import inlined
 from hdsim.drive import _mesh_layout
 from hdsim.drive._layout import (
     COLUMNS,
@@ -67,7 +67,7 @@ from hdsim.kernel import (
     TWIST_TORQUE,
 )
 
-_jit: Any = compiled
+_jit: Any = inlined
 
 
 @_jit

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hdsim._compile import compiled
+from hdsim._compile import inlined
 from hdsim.drive._mesh_layout import (
     ENERGY,
     ENGAGED,
@@ -52,7 +52,7 @@ from hdsim.drive._teeth import teeth_potential
 from hdsim.drive._teeth_table import table_potential
 from hdsim.kernel import mesh
 
-_inline: Any = compiled
+_inline: Any = inlined
 
 
 @_inline

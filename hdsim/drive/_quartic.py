@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from hdsim._compile import compiled
+from hdsim._compile import inlined
 
-_inline: Any = compiled
+_inline: Any = inlined
 
 #: Corners of a spring, each as its twist and by how much the spring is stiffer beyond it, before its table.
 CORNERS = 3

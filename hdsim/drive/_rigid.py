@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hdsim._compile import compiled
+from hdsim._compile import inlined
 from hdsim.drive import _mesh_layout
 from hdsim.drive._layout import (
     COLUMNS,
@@ -44,7 +44,7 @@ from hdsim.kernel import (
     TWIST_TORQUE,
 )
 
-_jit: Any = compiled
+_jit: Any = inlined
 
 
 @_jit

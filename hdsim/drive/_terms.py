@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hdsim._abi import call_element, call_signal, call_twist
-from hdsim._compile import compiled
+from hdsim._compile import inlined
 from hdsim.drive._layout import (
     ACCOUNTS,
     COLUMNS,
@@ -48,7 +48,7 @@ from hdsim.kernel import (
     TWIST_RATE,
 )
 
-_jit: Any = compiled
+_jit: Any = inlined
 
 
 @_jit
