@@ -74,7 +74,7 @@ def contest(
     names = [one.name for one in shortlist]
     best = {n: (bench.power(found.predictions), found) for n, (found, _) in known.items() if n in names}
     shares = {one.name: one.share.share for one in shortlist}
-    shortlist = [one for one in shortlist if one.name not in best]
+    everyone, shortlist = shortlist, [one for one in shortlist if one.name not in best]
 
     def keep(name: str, several: Iterable[Fit]) -> None:
         for each in several:
@@ -118,7 +118,7 @@ def contest(
     for name in further:
         tell(f"fitting {name} in full")
         keep(name, full_fits(bench, base, best[name][1]))
-    _look_alikes(bench, base, shortlist, best, [*full, *further], shares, keep, tell)
+    _look_alikes(bench, base, everyone, best, [*full, *further], shares, keep, tell)
     first = min(best, key=lambda name: best[name][0])
     if first in further:
         enough = LEFT_IN * min(known_power, best[first][0])

@@ -111,3 +111,21 @@ def test_what_the_screen_ranks_above_the_best_is_fitted_from_where_that_led(
     bench, base = SimpleNamespace(noise_power=1.0), SimpleNamespace(frees=[])
     _look_alikes(bench, base, shortlist, best, full, shares, None, None)
     assert asked == rivals
+
+
+def test_what_was_fitted_before_is_fitted_from_where_another_leads(opened, monkeypatch):
+    """Seen without: Maxwell slip for Duhem's law, which had been fitted while a rest counted."""
+    bench, base = opened
+    asked = []
+    monkeypatch.setattr(
+        "hdsim.diagnosis.contest._from_elsewhere",
+        lambda _bench, _base, _theta, where, those, *_: asked.extend((one.name, where) for one in those),
+    )
+    linear = SimpleNamespace(fitting=SimpleNamespace(in_series=False))
+    shortlist = [
+        SimpleNamespace(name=name, share=SimpleNamespace(share=0.9), added=linear)
+        for name in (DUHEM, MAXWELL)
+    ]
+    behind = replace(base, predictions=[2.0 * each for each in base.predictions])
+    contest(bench, base, shortlist, None, None, {MAXWELL: (base, True), DUHEM: (behind, True)})
+    assert asked == [(DUHEM, f"where {MAXWELL} led")]

@@ -28,7 +28,6 @@ def test_a_drive_that_only_sticks_at_its_reversals_lacks_nothing():
 
 
 @pytest.mark.slow
-@pytest.mark.study
 def test_an_effect_is_named_alone_beside_a_rest():
     """Seen without: an eccentricity and an unbalance as well, and a torque of 1.06 times its noise left.
 
