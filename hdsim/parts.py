@@ -139,6 +139,8 @@ class Builder(Protocol):
     ratio: float
     """Signed ratio motor angle / output angle."""
     rated_torque_nm: float
+    least_stiffness_nm_per_rad: float
+    """Of the drive's own torsion spring, in its softest segment; infinite where the mesh is rigid."""
     twist_sign: float
     """Sign of the torque on the output at a positive twist of the torsion spring, 1 or -1."""
     input_frictions: Sequence[InputFriction]
@@ -285,6 +287,17 @@ class Effect(Part):
     printed: ClassVar[bool] = False
     of_teeth: ClassVar[OfTeeth | None] = None
     finer: ClassVar[tuple[Any, ...]] = ()
+
+    def misfit(self, least_stiffness_nm_per_rad: float) -> str:
+        """Which numbers no drive with such a torsion spring can have, as ``field: found ..., expected ...``.
+
+        Args:
+            least_stiffness_nm_per_rad: of the spring's softest segment; infinite where the mesh is rigid.
+
+        Returns:
+            The complaint; empty where there is none.
+        """
+        return ""
 
     @classmethod
     def sized(cls, given: Mapping[str, Any], size: DriveSize, reference: DriveSize) -> dict[str, Any]:

@@ -267,6 +267,16 @@ class Drive(Parameters):
         return self.model_copy(update={"mesh": mesh.model_copy(update={"ring": "static"})})
 
     @property
+    def least_stiffness_nm_per_rad(self) -> float:
+        """Of the torsion spring, in its softest segment, N m/rad; infinite where the mesh is rigid."""
+        chain = self.torsion
+        if isinstance(self.mesh, RigidMesh):
+            return math.inf
+        return min(
+            chain.stiffness_k1_nm_per_rad, chain.stiffness_k2_nm_per_rad, chain.stiffness_k3_nm_per_rad
+        )
+
+    @property
     def ratio(self) -> float:
         """Signed ratio motor angle / output angle: -z_f/(z_c - z_f) or z_c/(z_c - z_f)."""
         z_f, z_c = self.geometry.flexspline_teeth, self.geometry.circular_spline_teeth

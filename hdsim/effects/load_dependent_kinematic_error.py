@@ -9,6 +9,7 @@ from pydantic import Field
 
 from hdsim.effects._fitting import Fitting, Harmonic, Plausible
 from hdsim.effects._kernels import Turn, factors
+from hdsim.errors import InputError
 from hdsim.kernel import (
     MOTOR_ANGLE,
     MOTOR_TORQUE,
@@ -129,8 +130,25 @@ class LoadDependentKinematicError(Effect):
     )
     """The harmonics."""
 
+    def misfit(self, least_stiffness_nm_per_rad: float) -> str:
+        """Softer than this somewhere, the spring would hold no twist there."""
+        together = sum(c.stiffness_nm_per_rad for c in self.components)
+        if together < least_stiffness_nm_per_rad:
+            return ""
+        return (
+            f"components: found {together:.4g} N m/rad together, expected less than the "
+            f"{least_stiffness_nm_per_rad:.4g} N m/rad of the drive's own torsion spring (drive.torsion): "
+            "where they are soft, nothing would hold the twist"
+        )
+
     def contribute(self, build: Builder) -> None:
-        """Add the uneven part of the torsion spring."""
+        """Add the uneven part of the torsion spring.
+
+        Raises:
+            InputError: it is as stiff as the spring itself.
+        """
+        if complaint := self.misfit(build.least_stiffness_nm_per_rad):
+            raise InputError(f"effects.load_dependent_kinematic_error.{complaint}")
         numbers = [float(len(self.components))]
         for c in self.components:
             numbers += [c.stiffness_nm_per_rad, *factors(c.order, c.per), math.radians(c.phase_deg)]

@@ -129,6 +129,16 @@ class Scenario(Parameters):
                 chosen[name] = stated | sized_defaults(effect, stated, size)
         return chosen
 
+    @field_validator("effects")
+    @classmethod
+    def _held_by_the_drive(cls, effects: Effects, info: ValidationInfo) -> Effects:
+        drive: Drive | None = info.data.get("drive")
+        if drive is not None:
+            for name, effect in effects.active().items():
+                if complaint := effect.misfit(drive.least_stiffness_nm_per_rad):
+                    raise ValueError(f"{name}.{complaint}")
+        return effects
+
     @model_validator(mode="after")
     def _live_numbers(self) -> Scenario:
         for name in self.live.parameters:

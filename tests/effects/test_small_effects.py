@@ -8,7 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hdsim.drive.model import Model
+from hdsim.drive.parameters import Drive
+from hdsim.effects.load_dependent_kinematic_error import LoadDependentKinematicError
 from hdsim.effects.wave_generator_bearing import BearingComponent, WaveGeneratorBearing
+from hdsim.errors import InputError
 from hdsim.recording import Recording
 from hdsim.scenario import Scenario
 from hdsim.simulation.setup import build_run
@@ -72,6 +76,28 @@ def test_an_error_that_grows_with_the_load_is_the_uneven_springs_wind_up() -> No
     assert amplitudes[0] == pytest.approx(TORQUE * 1500.0 / STIFFNESS**2 / ARCSEC, rel=0.01)
     assert amplitudes[0] == pytest.approx(amplitudes[1])
     assert amplitudes[0] == pytest.approx(10 * amplitudes[2])
+
+
+def test_an_uneven_spring_is_softer_than_the_drives_own() -> None:
+    """Beyond it the twist runs away; up to it the load hangs on what is left: TORQUE over 5 % of it."""
+
+    def parts(second: float) -> dict[str, Any]:
+        terms = [{"order": 2, "stiffness_nm_per_rad": 1.2e4}, {"order": 4, "stiffness_nm_per_rad": second}]
+        return {"load_dependent_kinematic_error": {"components": terms}}
+
+    r = turned(parts(0.7e4), TORQUE, 2.0)
+    assert np.abs(r["output_angle"] + r["motor_angle"] / 100).max() < 1.5 * TORQUE / (0.05 * STIFFNESS)
+    with pytest.raises(ValueError, match=r"components: found 2e\+04 N m/rad together, expected less than"):
+        turned(parts(0.8e4), TORQUE, 2.0)
+    effect = LoadDependentKinematicError.model_validate(parts(8e4)["load_dependent_kinematic_error"])
+    with pytest.raises(InputError, match="components: found"):
+        Model(
+            Drive.model_validate({"preset": "seed-2021", "mesh": {"model": "lumped"}}),
+            [effect],
+            load_inertia_kg_m2=0.05,
+        )
+    rigid = turned(parts(0.8e4), TORQUE, 2.0, mesh={"model": "rigid"})
+    assert rigid["output_angle"] == pytest.approx(-rigid["motor_angle"] / 100)
 
 
 @pytest.mark.parametrize("speed", [3.0, -3.0])
