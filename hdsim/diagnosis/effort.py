@@ -14,8 +14,8 @@ MOST_EFFECTS, MOST_STAGES = 4, 7
 PASSES = 2
 #: Work after which no further pass begins, in integration steps: about a minute of a processor core (chosen:
 #: that is asked of a whole diagnosis; with half of it two of 45 blind pairs were explained less well).
-MOST_WORK = 16e6
-#: Samples worked on in the time of a step (0.8 and 3.3 microseconds add up to the time of a long diagnosis).
+MOST_WORK = 22e6
+#: Samples worked on in the time of a step (0.6 and 2.4 microseconds add up to the time of a long diagnosis).
 SAMPLES_A_STEP = 4.0
 
 
