@@ -38,7 +38,7 @@ def test_a_search_that_has_done_enough_keeps_its_first_names_and_says_so(tmp_pat
     assert effort.work_of(short) < 0.8 * effort.work_of(whole)
 
 
-@pytest.mark.parametrize(("passes", "steps", "enough"), [(1, 2e7, False), (2, 1e7, False), (2, 2e7, True)])
+@pytest.mark.parametrize(("passes", "steps", "enough"), [(1, 3e7, False), (2, 1e7, False), (2, 3e7, True)])
 def test_two_passes_are_made_whatever_they_take(passes, steps, enough):
     predictor = SimpleNamespace(steps=[steps], record=SimpleNamespace(time=np.zeros(1000)))
     assert effort.enough_done(SimpleNamespace(predictors=[predictor]), passes) == enough
