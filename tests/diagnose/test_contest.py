@@ -121,11 +121,20 @@ def test_what_was_fitted_before_is_fitted_from_where_another_leads(opened, monke
         "hdsim.diagnosis.contest._from_elsewhere",
         lambda _bench, _base, _theta, where, those, *_: asked.extend((one.name, where) for one in those),
     )
-    linear = SimpleNamespace(fitting=SimpleNamespace(in_series=False))
+    linear = SimpleNamespace(fitting=SimpleNamespace(in_series=False), coefficients=(0.0,))
     shortlist = [
-        SimpleNamespace(name=name, share=SimpleNamespace(share=0.9), added=linear)
+        SimpleNamespace(name=name, share=SimpleNamespace(share=0.9), added=linear, columns=None, others=())
         for name in (DUHEM, MAXWELL)
     ]
     behind = replace(base, predictions=[2.0 * each for each in base.predictions])
-    contest(bench, base, shortlist, None, None, {MAXWELL: (base, True), DUHEM: (behind, True)})
+    monkeypatch.setattr("hdsim.diagnosis.contest.designs", lambda *_: [np.zeros((1, 1))])
+    monkeypatch.setattr("hdsim.diagnosis.contest.rough_fits", lambda *_: [base])
+    monkeypatch.setattr("hdsim.diagnosis.contest.full_fits", lambda *_: [base])
+    monkeypatch.setattr("hdsim.diagnosis.contest.fits_at_next_minima", lambda *_: [])
+    known = {DUHEM: (behind, True)}
+    left = left_of(bench, base)
+    residual = SimpleNamespace(values=left.values, project=lambda _: left.values[:, None])
+    contest(bench, base, shortlist, residual, None, known)
     assert asked == [(DUHEM, f"where {MAXWELL} led")]
+    contest(bench, base, shortlist, residual, None, known)  # over the same base once more: it has been
+    assert len(asked) == 1
