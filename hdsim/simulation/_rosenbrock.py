@@ -211,7 +211,10 @@ def advance(  # type: ignore[no-untyped-def]
                 bend += ratio * ratio
             error = sqrt(total / n)
             if rtol > 0.0 and bend < np.inf:
-                error = max(error, (rtol * _CUBIC_PEAK * sqrt(bend / n)) ** (4.0 / 3.0) / rtol)
+                between = rtol * _CUBIC_PEAK * sqrt(bend / n)
+                # Most often it is the smaller one, and no power need be computed.
+                if between * between * between * between > (rtol * error) ** 3:
+                    error = max(error, between ** (4.0 / 3.0) / rtol)
             counts[NFEV] += 5
 
             if not isfinite(error):
