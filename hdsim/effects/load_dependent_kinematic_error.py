@@ -9,7 +9,7 @@ from pydantic import Field
 
 from hdsim.effects._fitting import Fitting, Harmonic, Plausible
 from hdsim.effects._kernels import Turn, factors
-from hdsim.errors import InputError
+from hdsim.errors import PhysicsError
 from hdsim.kernel import (
     MOTOR_ANGLE,
     MOTOR_TORQUE,
@@ -145,10 +145,10 @@ class LoadDependentKinematicError(Effect):
         """Add the uneven part of the torsion spring.
 
         Raises:
-            InputError: it is as stiff as the spring itself.
+            PhysicsError: it is as stiff as the spring itself.
         """
         if complaint := self.misfit(build.least_stiffness_nm_per_rad):
-            raise InputError(f"effects.load_dependent_kinematic_error.{complaint}")
+            raise PhysicsError(f"effects.load_dependent_kinematic_error.{complaint}")
         numbers = [float(len(self.components))]
         for c in self.components:
             numbers += [c.stiffness_nm_per_rad, *factors(c.order, c.per), math.radians(c.phase_deg)]
