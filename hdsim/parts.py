@@ -139,8 +139,6 @@ class Builder(Protocol):
     ratio: float
     """Signed ratio motor angle / output angle."""
     rated_torque_nm: float
-    least_stiffness_nm_per_rad: float
-    """Of the drive's own torsion spring, in its softest segment; infinite where the mesh is rigid."""
     twist_sign: float
     """Sign of the torque on the output at a positive twist of the torsion spring, 1 or -1."""
     input_frictions: Sequence[InputFriction]

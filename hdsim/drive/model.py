@@ -72,7 +72,6 @@ class Model(Contributed):
         self.parts = tuple(parts)
         self.ratio = drive.ratio
         self.rated_torque_nm = drive.rated_torque_nm
-        self.least_stiffness_nm_per_rad = drive.least_stiffness_nm_per_rad
         toothed = isinstance(drive.mesh, TeethMesh | TabulatedMesh)
         self.twist_sign = -1.0 if toothed and drive.arrangement == "flexspline_fixed" else 1.0
         self.seed = seed

@@ -9,7 +9,6 @@ from pydantic import Field
 
 from hdsim.effects._fitting import Fitting, Harmonic, Plausible
 from hdsim.effects._kernels import Turn, factors
-from hdsim.errors import PhysicsError
 from hdsim.kernel import (
     MOTOR_ANGLE,
     MOTOR_TORQUE,
@@ -142,13 +141,7 @@ class LoadDependentKinematicError(Effect):
         )
 
     def contribute(self, build: Builder) -> None:
-        """Add the uneven part of the torsion spring.
-
-        Raises:
-            PhysicsError: it is as stiff as the spring itself.
-        """
-        if complaint := self.misfit(build.least_stiffness_nm_per_rad):
-            raise PhysicsError(f"effects.load_dependent_kinematic_error.{complaint}")
+        """Add the uneven part of the torsion spring."""
         numbers = [float(len(self.components))]
         for c in self.components:
             numbers += [c.stiffness_nm_per_rad, *factors(c.order, c.per), math.radians(c.phase_deg)]

@@ -28,7 +28,6 @@ class Probe(Contributed):
     def __init__(self, scenario: Scenario, effect: Effect) -> None:
         super().__init__()
         self.ratio, self.rated_torque_nm = scenario.drive.ratio, scenario.drive.rated_torque_nm
-        self.least_stiffness_nm_per_rad = scenario.drive.least_stiffness_nm_per_rad
         self.seed = scenario.run.seed
         effect.contribute(self)
         self.frictions = self._given.input_frictions

@@ -56,7 +56,6 @@ class Collector:
     ) -> None:
         self.ratio = ratio
         self.rated_torque_nm = 52.0
-        self.least_stiffness_nm_per_rad = math.inf
         self.twist_sign = 1.0
         self.declared: list[InputFriction] = [InputFriction(0.0, viscous, 1.0)]
         self.input_frictions: Sequence[InputFriction] = ()

@@ -8,11 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hdsim.drive.model import Model
-from hdsim.drive.parameters import Drive
-from hdsim.effects.load_dependent_kinematic_error import LoadDependentKinematicError
 from hdsim.effects.wave_generator_bearing import BearingComponent, WaveGeneratorBearing
-from hdsim.errors import PhysicsError
 from hdsim.recording import Recording
 from hdsim.scenario import Scenario
 from hdsim.simulation.setup import build_run
@@ -89,13 +85,6 @@ def test_an_uneven_spring_is_softer_than_the_drives_own() -> None:
     assert np.abs(r["output_angle"] + r["motor_angle"] / 100).max() < 1.5 * TORQUE / (0.05 * STIFFNESS)
     with pytest.raises(ValueError, match=r"components: found 2e\+04 N m/rad together, expected less than"):
         turned(parts(0.8e4), TORQUE, 2.0)
-    effect = LoadDependentKinematicError.model_validate(parts(8e4)["load_dependent_kinematic_error"])
-    with pytest.raises(PhysicsError, match="components: found"):
-        Model(
-            Drive.model_validate({"preset": "seed-2021", "mesh": {"model": "lumped"}}),
-            [effect],
-            load_inertia_kg_m2=0.05,
-        )
     rigid = turned(parts(0.8e4), TORQUE, 2.0, mesh={"model": "rigid"})
     assert rigid["output_angle"] == pytest.approx(-rigid["motor_angle"] / 100)
 
