@@ -119,8 +119,8 @@ def contest(
         tell(f"fitting {name} in full")
         keep(name, full_fits(bench, base, best[name][1]))
     # What was known beside a leader that was known, too, has been fitted from there.
-    led = shortlist if min(best, key=lambda name: best[name][0]) in known else everyone
-    _look_alikes(bench, base, led, best, [*full, *further], shares, keep, tell)
+    alike = shortlist if min(best, key=lambda name: best[name][0]) in known else everyone
+    _look_alikes(bench, base, alike, best, [*full, *further], shares, keep, tell)
     first = min(best, key=lambda name: best[name][0])
     if first in further:
         enough = LEFT_IN * min(known_power, best[first][0])

@@ -160,7 +160,7 @@ def test_a_channel_that_there_is_not_is_refused_by_name():
 def test_a_load_that_runs_away_behind_a_prescribed_motor_is_given_up_before_its_teeth_are_followed(
     monkeypatch,
 ):
-    """Teeth whose stiffness is below zero over a part of the turn: no drive, but what any part could add."""
+    """Teeth whose stiffness is below zero over a part of the turn: no drive, but what a search may try."""
     monkeypatch.setattr(LoadDependentKinematicError, "misfit", lambda *_: "")
     uneven = [{"order": 2, "stiffness_nm_per_rad": 4e4, "per": "relative_turn"}]
     effects = {"load_dependent_kinematic_error": {"components": uneven}, "kinematic_error": {}}
