@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,22 +31,41 @@ def traces(
     Returns:
         Every effect in the units that were used, with its design, None where it could not be predicted.
     """
-    found = list(zip(tried, designs(bench, state, predictions, tried), strict=True))
-    again: dict[int, Added] = {}
-    for k, (added, columns) in enumerate(found):
+    found: list[tuple[Added, Array | None]] = [(added, None) for added in tried]
+
+    def simulate(asked: Mapping[int, Added]) -> None:
+        of_all = designs(bench, state, predictions, list(asked.values()))
+        for (k, added), columns in zip(asked.items(), of_all, strict=True):
+            if columns is not None:
+                found[k] = (added, columns)
+
+    def fitting_factor(k: int) -> float:
+        """By which a unit has to change."""
+        added, columns = found[k]
         if columns is None or added.fitting.cumulative or added.fitting.play:
-            continue
+            return 1.0
         size = float(np.sqrt(np.mean(columns**2, axis=0).max(initial=0.0)))
-        if size > 0 and not wanted / FITTING < size < wanted * FITTING:
-            # A stronger one than is plausible may be no drive: stiffness all round that is more than its own.
-            factor = min(float(np.clip(wanted / size, 1e-3, 1e5)), max(1.0, added.to_plausible(state.drive)))
-            again[k] = replace(added, fitting=added.fitting.rescaled(factor))
-    for (k, added), columns in zip(
-        again.items(), designs(bench, state, predictions, list(again.values())), strict=True
-    ):
-        if columns is not None:
-            found[k] = (added, columns)
+        if size == 0.0 or wanted / FITTING < size < wanted * FITTING:
+            return 1.0
+        # A stronger one than is plausible may be no drive: stiffness all round that is more than its own.
+        return min(float(np.clip(wanted / size, 1e-3, 1e5)), max(1.0, added.to_plausible(state.drive)))
+
+    # What one start of an effect's shapes needs, the others need as a rule, and are not simulated in vain.
+    first: dict[tuple[str, str], int] = {}
+    for k, added in enumerate(tried):
+        first.setdefault((added.effect, added.fitting.label), k)
+    simulate({k: tried[k] for k in first.values()})
+    factors = {way: fitting_factor(k) for way, k in first.items()}
+    rest = [k for k in range(len(tried)) if k not in first.values()]
+    simulate({k: _rescaled(tried[k], factors[tried[k].effect, tried[k].fitting.label]) for k in rest})
+    again = {k: fitting_factor(k) for k in range(len(tried))}
+    simulate({k: _rescaled(found[k][0], factor) for k, factor in again.items() if factor != 1.0})
     return found
+
+
+def _rescaled(added: Added, factor: float) -> Added:
+    """An effect in units that are so many times what they were."""
+    return added if factor == 1.0 else replace(added, fitting=added.fitting.rescaled(factor))
 
 
 def designs(

@@ -19,6 +19,7 @@ from hdsim.estimate.reliability import knots_apart_s
 from hdsim.estimate.short_cut import take_short_cut
 from hdsim.estimate.state import state_of
 from hdsim.estimate.thin import over, thinned
+from hdsim.estimate.tolerance import as_exact_as_told
 
 if TYPE_CHECKING:
     from hdsim.recording import Recording
@@ -111,4 +112,5 @@ def bench_for(
     if apart_s > 0.0:
         bench = opened(apart_s)
     take_short_cut(bench, state)
+    as_exact_as_told(bench, state)
     return bench
