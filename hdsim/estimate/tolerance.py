@@ -14,9 +14,9 @@ from hdsim.estimate.predict import RTOL, PredictionError
 from hdsim.estimate.records import Array
 from hdsim.estimate.state import State
 
-#: Part of a channel's noise that the integrator may err by, root mean square. Differences err by two thirds of
-#: that at most, for errors are partly the same in both runs: numbers that the data hardly tell heard at most
-#: 0.06 of a prior's information in it (11 cases of ``benchmarks/diagnose_time.py``, 900 to 49,000 rows).
+#: Part of a channel's noise that the integrator may err by, root mean square. Differences err by two thirds
+#: of that at most, for errors are partly the same in both runs: numbers that the data hardly tell heard at
+#: most 0.06 of a prior's information in it (11 cases of ``benchmarks/diagnose_time.py``, 900 to 49,000 rows).
 PART = 1e-3
 #: Loosest tolerance of a fit, and that of the prediction that it is held against.
 LOOSEST, REFERENCE = 1e-5, 1e-7
