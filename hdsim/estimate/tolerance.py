@@ -41,16 +41,15 @@ def as_exact_as_told(bench: Bench, state: State) -> None:
             predictor.rtol = rtol
         return bench.predict(state, everything=True)
 
+    errors = dict.fromkeys(range(len(bench.predictors)), 0.0)
     try:
         here, closely = predicted(LOOSEST), predicted(REFERENCE)
     except PredictionError:
-        errors = {}
+        errors = dict.fromkeys(errors, np.inf)
     else:
-        errors = dict.fromkeys(range(len(bench.predictors)), 0.0)
         for series, one, other in zip(bench.series, here, closely, strict=True):
-            error = float(np.sqrt(np.mean((one - other) ** 2)))
-            errors[series.record] = max(errors[series.record], error / max(series.noise, 1e-300))
+            error = float(np.sqrt(np.mean((one - other) ** 2))) / max(series.noise, 1e-300)
+            errors[series.record] = max(errors[series.record], error)
     for index, predictor in enumerate(bench.predictors):
-        error = errors.get(index, np.inf)
+        predictor.rtol = float(np.clip(LOOSEST * PART / max(errors[index], PART), RTOL, LOOSEST))
         predictor.steps.clear()  # these runs are no measure of others
-        predictor.rtol = float(np.clip(LOOSEST * PART / max(error, 1e-300), RTOL, LOOSEST))
