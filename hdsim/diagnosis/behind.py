@@ -36,8 +36,9 @@ def behind_sensor(
     for added in starts(name, fitting, (), ranges)[:1]:
         candidate = state.candidate()
         try:
-            without = first.predict(candidate, ASKED)
-            there = first.predict(replace(state, added=(*state.added, added)).candidate(), ASKED)
+            with first.closely():
+                without = first.predict(candidate, ASKED)
+                there = first.predict(replace(state, added=(*state.added, added)).candidate(), ASKED)
         except PredictionError:
             return True
         change = {c: first.slow.of(there[f"true_{c}"] - without[f"true_{c}"]) for c in CHANGED}

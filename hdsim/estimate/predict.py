@@ -6,7 +6,8 @@ are predicted; without the motor's encoder torques are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -79,6 +80,15 @@ class Predictor(Prescribed):
         self.table_for: frozenset[str] | None = None
         #: Number of the record among those that are held against a model together.
         self.number = 0
+
+    @contextlib.contextmanager
+    def closely(self) -> Iterator[None]:
+        """Predict with ``RTOL``, where differences count that are small beside the sensors' noise."""
+        kept, self.rtol = self.rtol, min(self.rtol, RTOL)
+        try:
+            yield
+        finally:
+            self.rtol = kept
 
     def measured(self, channel: str) -> tuple[Array, Mask, float, float]:
         """What a predicted channel is compared with.
