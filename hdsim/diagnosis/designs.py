@@ -58,6 +58,8 @@ def traces(
     factors = {way: fitting_factor(k) for way, k in first.items()}
     rest = [k for k in range(len(tried)) if k not in first.values()]
     simulate({k: _rescaled(tried[k], factors[tried[k].effect, tried[k].fitting.label]) for k in rest})
+    # Where that cannot be predicted, its own may be.
+    simulate({k: tried[k] for k in rest if found[k][1] is None})
     again = {k: fitting_factor(k) for k in range(len(tried))}
     simulate({k: _rescaled(found[k][0], factor) for k, factor in again.items() if factor != 1.0})
     return found

@@ -29,6 +29,7 @@ class Tried:
     effect: str
     fitting: Way
     reaches: float = 1.0
+    most: float = np.inf  # unit beyond which it cannot be predicted
 
     def to_plausible(self, _drive: object) -> float:
         return 1e9
@@ -41,7 +42,10 @@ def simulated(monkeypatch):
 
     def design(_bench, _state, _predictions, tried):
         done.extend(tried)
-        return [np.full((10, 1), one.fitting.unit * one.reaches) for one in tried]
+        return [
+            None if one.fitting.unit > one.most else np.full((10, 1), one.fitting.unit * one.reaches)
+            for one in tried
+        ]
 
     monkeypatch.setattr(designs, "designs", design)
     return done
@@ -65,6 +69,13 @@ def test_a_start_that_needs_another_unit_gets_it(simulated):
     sizes = [float(columns[0, 0]) for _, columns in traces(starts, wanted=1e-3)]
     assert sizes == pytest.approx([1e-3, 1e-3, 0.0])
     assert len(simulated) == 1 + 2 + 2
+
+
+def test_a_start_that_cannot_be_predicted_in_the_others_unit_keeps_its_own(simulated):
+    starts = [Tried("tooth", Way("a")), Tried("tooth", Way("a"), 3e3, most=10.0)]
+    found = traces(starts, wanted=1e3)
+    assert [added.fitting.unit for added, _ in found] == pytest.approx([1e3, 1.0])
+    assert [float(columns[0, 0]) for _, columns in found] == pytest.approx([1e3, 3e3])
 
 
 def test_ways_of_fitting_have_units_of_their_own(simulated):
