@@ -10,7 +10,7 @@ import numpy as np
 from hdsim.diagnosis.starts import starts
 from hdsim.effects._fitting import Fitting
 from hdsim.estimate.bench import Bench
-from hdsim.estimate.predict import PredictionError
+from hdsim.estimate.predict import RTOL, PredictionError
 from hdsim.estimate.state import State
 
 #: Channels in which an effect shows where it acts, and those that tell the drive's stiffness.
@@ -36,7 +36,8 @@ def behind_sensor(
     for added in starts(name, fitting, (), ranges)[:1]:
         candidate = state.candidate()
         try:
-            with first.closely():
+            # What counts may be small beside the sensors' noise, to which a record's own tolerance is set.
+            with first.within(min(first.rtol, RTOL)):
                 without = first.predict(candidate, ASKED)
                 there = first.predict(replace(state, added=(*state.added, added)).candidate(), ASKED)
         except PredictionError:

@@ -51,15 +51,14 @@ def traces(
         return min(float(np.clip(wanted / size, 1e-3, 1e5)), max(1.0, added.to_plausible(state.drive)))
 
     # What one start of an effect's shapes needs, the others need as a rule, and are not simulated in vain.
-    first: dict[tuple[str, str], int] = {}
-    for k, added in enumerate(tried):
-        first.setdefault((added.effect, added.fitting.label), k)
+    ways = [(added.effect, added.fitting.label) for added in tried]
+    first = {way: ways.index(way) for way in ways}
     simulate({k: tried[k] for k in first.values()})
     factors = {way: fitting_factor(k) for way, k in first.items()}
-    rest = [k for k in range(len(tried)) if k not in first.values()]
-    simulate({k: _rescaled(tried[k], factors[tried[k].effect, tried[k].fitting.label]) for k in rest})
+    rest = {k: factors[way] for k, way in enumerate(ways) if k != first[way]}
+    simulate({k: _rescaled(tried[k], factor) for k, factor in rest.items()})
     # Where that cannot be predicted, its own may be.
-    simulate({k: tried[k] for k in rest if found[k][1] is None})
+    simulate({k: tried[k] for k, factor in rest.items() if factor != 1.0 and found[k][1] is None})
     again = {k: fitting_factor(k) for k in range(len(tried))}
     simulate({k: _rescaled(found[k][0], factor) for k, factor in again.items() if factor != 1.0})
     return found

@@ -168,14 +168,10 @@ class Bench:
     @contextlib.contextmanager
     def coarse(self) -> Iterator[None]:
         """Predict with the tolerance of a search."""
-        kept = [predictor.rtol for predictor in self.predictors]
-        for predictor in self.predictors:
-            predictor.rtol = max(predictor.rtol, COARSE_RTOL)
-        try:
+        with contextlib.ExitStack() as stack:
+            for predictor in self.predictors:
+                stack.enter_context(predictor.within(max(predictor.rtol, COARSE_RTOL)))
             yield
-        finally:
-            for predictor, rtol in zip(self.predictors, kept, strict=True):
-                predictor.rtol = rtol
 
     def predict_all(self, states: Sequence[State]) -> list[list[Array] | None]:
         """Predictions of the training records for many models, side by side in threads.

@@ -82,9 +82,9 @@ class Predictor(Prescribed):
         self.number = 0
 
     @contextlib.contextmanager
-    def closely(self) -> Iterator[None]:
-        """Predict with ``RTOL``, where differences count that are small beside the sensors' noise."""
-        kept, self.rtol = self.rtol, min(self.rtol, RTOL)
+    def within(self, rtol: float) -> Iterator[None]:
+        """Predict with another tolerance."""
+        kept, self.rtol = self.rtol, rtol
         try:
             yield
         finally:

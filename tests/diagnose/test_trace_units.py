@@ -78,6 +78,12 @@ def test_a_start_that_cannot_be_predicted_in_the_others_unit_keeps_its_own(simul
     assert [float(columns[0, 0]) for _, columns in found] == pytest.approx([1e3, 3e3])
 
 
+def test_a_start_that_cannot_be_predicted_in_its_own_unit_is_not_asked_twice(simulated):
+    starts = [Tried("tooth", Way("a")), Tried("tooth", Way("a"), most=0.1)]
+    assert [columns is None for _, columns in traces(starts, wanted=1.0)] == [False, True]
+    assert len(simulated) == 2
+
+
 def test_ways_of_fitting_have_units_of_their_own(simulated):
     tried = [
         Tried("tooth", Way("a")),

@@ -65,7 +65,7 @@ def test_a_model_that_cannot_be_predicted_is_asked_closely(monkeypatch):
     assert bench.predictors[0].rtol == RTOL
 
 
-def test_a_held_out_record_has_its_own(monkeypatch):
+def test_a_held_out_record_has_its_own():
     coarse = noisy(hdsim.simulate(SCENARIO), {c: 100.0 * s for c, s in NOISE.items()}, seed=1)
     fine = noisy(hdsim.simulate(SCENARIO), {c: 0.01 * s for c, s in NOISE.items()}, seed=2)
     one, other = bench_for([coarse], [fine], SCENARIO, None).predictors
