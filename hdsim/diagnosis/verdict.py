@@ -117,6 +117,9 @@ class Verdict(Part):
     """For ``unknown``: effects that explain a part, with the share, none probable enough to be identified."""
     parameters: dict[str, ParameterEstimate] = {}
     """Estimates of the base model's parameters."""
+    estimated_from: Literal["training", "all"] = "training"
+    """Data that the estimates, also those of effects, are of: ``all`` includes the held-out stretches, which
+    had judged the model before. Residuals are always of the estimates from training data."""
     moved: list[str] = []
     """Those whose interval excludes the base model's value; where the re-fit reduces a held-out residual and
     they do not explain most of what it changed, those that would do so alone."""

@@ -34,6 +34,7 @@ from hdsim.diagnosis.sentences import (
 )
 from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.verdict import Verdict
+from hdsim.estimate.all_data import all_rows, on_all_rows, refuse_held_out_records
 from hdsim.estimate.asked import asked_for
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
@@ -105,6 +106,7 @@ def diagnose(
     force: bool = False,
     black_box: bool = False,
     thorough: bool = False,
+    all_data: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Diagnosis:
     """Find what a model is missing.
@@ -118,6 +120,8 @@ def diagnose(
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline.
         thorough: look for a third effect and more whatever it takes (``hdsim.diagnosis.effort``).
+        all_data: estimate the numbers again from the held-out stretches too, once these have judged the model
+            (``hdsim.estimate.all_data``); of an ``unknown`` effect they stay.
         on_step: called with the name of each step.
 
     Returns:
@@ -127,11 +131,14 @@ def diagnose(
         InputError: the data cannot answer the question, or are suspect (see ``force``), or a black box is
             asked for without scikit-learn.
     """
+    refuse_held_out_records(all_data, holdout)
     if black_box:
         trees()
+    wanted = black_box, thorough, all_data
     with one_blas_thread():
-        tell = on_step or (lambda _: None)
-        return _diagnosed(measured, scenario, holdout, load, zeros, force, black_box, thorough, tell)
+        return _diagnosed(
+            measured, scenario, holdout, load, zeros, force, wanted, on_step or (lambda _: None)
+        )
 
 
 def _diagnosed(
@@ -141,11 +148,11 @@ def _diagnosed(
     load: LoadSource | None,
     zeros: Zeros,
     force: bool,
-    black_box: bool,
-    thorough: bool,
+    wanted: tuple[bool, bool, bool],
     tell: Callable[[str], object],
 ) -> Diagnosis:
     """See ``diagnose``."""
+    black_box, thorough, all_data = wanted
     seconds: dict[str, float] = {}
 
     @contextlib.contextmanager
@@ -218,8 +225,7 @@ def _diagnosed(
     if not (judged.decision.names or whole[1].decision.names):
         found, judged = whole  # of several names that are none, what they explain together says most
     evidence, decision, gap, predictions = judged.evidence, judged.decision, judged.gap, judged.predictions
-    named = found.named if decision.names else []
-    current = found.fit if decision.names else base.fit
+    named, current = (found.named, found.fit) if decision.names else ([], base.fit)
     unknown = decision.kind == "unknown"
     curve: CurveFit | None = None
     with_it: dict[str, Gap] | None = None
@@ -257,13 +263,18 @@ def _diagnosed(
     problems += [*jumped(bench, jumps), *unsettled(bench, current)]
     if found.ended:
         problems.append(told_of_end(bench, len(found.stages) - 1))
-    intervals = base_intervals(current, base.freedoms)
+    final, counted = current, contextlib.ExitStack()
+    if all_data and not unknown:
+        with step("prove", "estimating the parameters from all data"):
+            counted.enter_context(all_rows(bench))
+            final = on_all_rows(bench, current, lambda fit: discrepancy(bench, fit, place) if lacks else None)
+    intervals = base_intervals(final, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
-    intervals, blurred = told_of_damping(bench, current.state, intervals)
+    intervals, blurred = told_of_damping(bench, final.state, intervals)
     problems += [*delays(bench, intervals), *blurred]
     off = [i for i in intervals if i.moved]
     if decision.kind == "parameter":
-        off = wrong_numbers(bench, base.before, current, intervals)
+        off = wrong_numbers(bench, base.before, final, intervals)
         if not off:
             decision.kind = "nothing"
     rest = remains(evidence) if named else None
@@ -282,6 +293,7 @@ def _diagnosed(
         "readings": readings,
         "short_cut": short_cut_of(bench, current.predictions, predictions["after"]),
         "seconds": seconds,
+        "estimated_from": "training" if final is current else "all",
     }
     patterned = evidence.left_chance <= RULES.chance and evidence.left >= RULES.structured
     noisy = evidence.rest is not None and evidence.rest.times_noise > RULES.rest
@@ -290,23 +302,24 @@ def _diagnosed(
     elif unknown:
         verdict = without_a_place(bench, found.fit, common)
     elif named:
-        effects = named_effects(named, decision, current)
+        effects = named_effects(named, decision, final)
         words = " and ".join(effect_words(effect) for effect in effects)
         sentence = f"The model is missing {words}.{rest_words(rest)}"
         with step("prove", "asking what the names say of the teeth"):
-            teeth = teeth_found(effects, current.state, (bench, current))
+            teeth = teeth_found(effects, final.state, (bench, final))
         verdict = Verdict(verdict="effect", sentence=sentence, effects=effects, teeth=teeth, **common)
     elif decision.kind == "parameter":
-        verdict = numbers_off(off, current, common)
+        verdict = numbers_off(off, final, common)
     else:
         said = "The data show no effect that is missing from the model."
         verdict = Verdict(verdict="nothing", sentence=said, **common)
+    counted.close()
     if doubts:
         words = "; ".join(f"{doubt.record}: {doubt.channel} {doubt.message}" for doubt in doubts)
         verdict.sentence = f"Check the data first: {words}. {verdict.sentence}"
     also = curve.fit if curve is not None and with_it is not None and named else None
     return Diagnosis(
-        verdict, evidence, checks, bench, base, found.stages, named, current, start, predictions, also
+        verdict, evidence, checks, bench, base, found.stages, named, final, start, predictions, also
     )
 
 

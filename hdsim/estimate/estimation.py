@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from hdsim.errors import InputError
+from hdsim.estimate.all_data import all_rows, on_all_rows, refuse_held_out_records
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
@@ -81,6 +82,7 @@ class Estimation:
         refit: how it was fitted.
         predictions: of all series, ``before`` and ``after``.
         short_cut: how predictions with teeth were made; None without.
+        estimated_from: data that the estimates are of; ``gap`` is of those from training data.
     """
 
     intervals: list[Interval]
@@ -97,6 +99,7 @@ class Estimation:
     refit: Refit
     predictions: dict[str, list[Array]]
     short_cut: ShortCut | None = None
+    estimated_from: Literal["training", "all"] = "training"
 
     @property
     def moved(self) -> list[str]:
@@ -127,6 +130,7 @@ def estimate(
     zeros: Zeros = "campaign",
     force: bool = False,
     black_box: bool = False,
+    all_data: bool = False,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
     """Estimate a scenario's parameters from measured records; ``hdsim.fit`` takes files too.
@@ -146,6 +150,8 @@ def estimate(
         zeros: whether a torque sensor has one zero in all records, one in each, or is trusted to have none.
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline.
+        all_data: estimate the parameters again from the held-out stretches too, once these have judged the
+            model (``hdsim.estimate.all_data``).
         on_step: called with the name of each step.
 
     Raises:
@@ -153,6 +159,7 @@ def estimate(
             a black box is asked for without scikit-learn.
     """
     tell = on_step or (lambda _: None)
+    refuse_held_out_records(all_data, holdout)
     if black_box:
         trees()
     tell("checking the data")
@@ -179,6 +186,14 @@ def estimate(
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
     problems += [*beginnings(bench), *one_way(bench), *moving_zeros(bench, found.fit.predictions)]
+    short_cut, seen = short_cut_of(bench, found.fit.predictions, predictions["after"]), None
+    if all_data:
+        tell("estimating the parameters from all data")
+        with all_rows(bench):
+            more = on_all_rows(bench, found.fit)
+            if more is not found.fit:
+                found.fit, found.intervals = more, base_intervals(more, found.freedoms)
+                seen = _directions(bench, more)
     found.intervals, blurred = told_of_damping(bench, found.fit.state, found.intervals)
     problems += [*unsettled(bench, found.fit), *blurred]
     own = found.fit.frees
@@ -197,7 +212,7 @@ def estimate(
         found.intervals,
         names,
         matrix,
-        _directions(bench, found.fit),
+        seen or _directions(bench, found.fit),
         left,
         gap,
         _readings(bench, predictions["after"], begins),
@@ -207,7 +222,8 @@ def estimate(
         found.fit,
         found,
         predictions,
-        short_cut_of(bench, found.fit.predictions, predictions["after"]),
+        short_cut,
+        "all" if seen else "training",
     )
 
 

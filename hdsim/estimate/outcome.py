@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from hdsim.estimate.estimation import Estimation
 from hdsim.estimate.found import DataProblem, Gap, ParameterEstimate, Part, ShortCut
@@ -58,6 +59,8 @@ class FitResult(Part):
 
     numbers: dict[str, FitParameter]
     """Every free parameter, by its path."""
+    estimated_from: Literal["training", "all"] = "training"
+    """Data that they are of: ``all`` includes the held-out stretches, which had judged the model before."""
     moved: list[str]
     """Parameters whose interval excludes the model's value."""
     correlation: Correlation
@@ -81,6 +84,7 @@ def result_of(found: Estimation) -> FitResult:
     paths = {free.name: list(free.paths) for free in found.refit.freedoms}
     return FitResult(
         numbers={i.name: _number(i, paths.get(i.name, []), found.left.get(i.name)) for i in found.intervals},
+        estimated_from=found.estimated_from,
         moved=found.moved,
         correlation=Correlation(names=found.names, matrix=found.correlation.round(4).tolist()),
         directions=[Seen(spread=d.spread, seen=d.seen, parts=d.parts) for d in found.directions],

@@ -44,6 +44,7 @@ def diagnose(
     force: bool = False,
     black_box: bool = False,
     thorough: bool = False,
+    all_data: bool = False,
     out: str | Path | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Diagnosis:
@@ -63,6 +64,7 @@ def diagnose(
         force: continue in spite of errors in the data.
         black_box: also fit gradient-boosted trees as a baseline (``hdsim[baseline]``).
         thorough: look for a third effect and more however long that takes.
+        all_data: estimate the parameters again from held-out stretches too, once these have judged the model.
         out: folder for the report, the log and the scenario with the result (``verdict.scenario``);
             needs the scenario's file.
         on_step: called with the name of each step.
@@ -79,7 +81,7 @@ def diagnose(
     records, held = _records(measured, mapping), _records(holdout, mapping)
     found = run(
         records, loaded(scenario), holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
-        thorough=thorough, on_step=on_step,
+        thorough=thorough, all_data=all_data, on_step=on_step,
     )  # fmt: skip
     if base is not None and out is not None:
         from hdsim.tell.save import save
@@ -101,6 +103,7 @@ def fit(
     zeros: Zeros = "campaign",
     force: bool = False,
     black_box: bool = False,
+    all_data: bool = False,
     out: str | Path | None = None,
     on_step: Callable[[str], object] | None = None,
 ) -> Estimation:
@@ -122,6 +125,7 @@ def fit(
         zeros: likewise.
         force: likewise.
         black_box: likewise.
+        all_data: likewise.
         out: folder for ``fit.json``, the page and ``fitted.yaml``; needs the scenario's file.
         on_step: called with the name of each step.
 
@@ -137,7 +141,7 @@ def fit(
     records, held = _records(measured, mapping), _records(holdout, mapping)
     found = estimate(
         records, loaded(scenario), holdout=held, free=free, fix=fix, apart=apart, load=load, zeros=zeros,
-        force=force, black_box=black_box, on_step=on_step,
+        force=force, black_box=black_box, all_data=all_data, on_step=on_step,
     )  # fmt: skip
     if base is not None and out is not None:
         from hdsim.tell.fit_report import save_fit

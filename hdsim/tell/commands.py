@@ -23,6 +23,7 @@ def diagnose(
     zeros: Any,
     force: bool,
     black_box: bool,
+    all_data: bool,
     thorough: bool,
 ) -> int:
     """Find which physical effect a model is missing.
@@ -39,7 +40,7 @@ def diagnose(
     with Progress() as tell:
         found = run(
             records, scenario, holdout=held, load=load, zeros=zeros, force=force, black_box=black_box,
-            thorough=thorough, on_step=tell,
+            thorough=thorough, all_data=all_data, on_step=tell,
         )  # fmt: skip
         tell("finding the next experiment, writing the report")
         told = gather(found)

@@ -67,6 +67,11 @@ def measured_options(command: F) -> F:
                 is_flag=True,
                 help="Also fit gradient-boosted trees as a black-box baseline (hdsim[baseline]).",
             ),
+            click.option(
+                "--all-data",
+                is_flag=True,
+                help="After the validation, estimate the parameters from the held-out stretches too.",
+            ),
         )
     ):
         command = option(command)

@@ -35,6 +35,7 @@ def fit(
     zeros: Any,
     force: bool,
     black_box: bool,
+    all_data: bool,
 ) -> int:
     """Estimate a scenario's parameters from measured records.
 
@@ -51,7 +52,7 @@ def fit(
     with Progress() as tell:
         found = hdsim.fit(
             records, scenario, holdout=held, free=free, fix=fix, apart=apart, load=load, zeros=zeros,
-            force=force, black_box=black_box, on_step=tell,
+            force=force, black_box=black_box, all_data=all_data, on_step=tell,
         )  # fmt: skip
         tell("writing the report")
         page = save_fit(found, model, out)
@@ -70,7 +71,7 @@ def _show(result: FitResult) -> None:
     from hdsim.console import console
     from hdsim.tell.beside import baselines
     from hdsim.tell.fit_report import GAP_HEAD, gap_rows, summary
-    from hdsim.tell.words import named_number, shown
+    from hdsim.tell.words import FROM_ALL_DATA, named_number, shown
 
     out = console()
     out.print(Text(summary(result)), highlight=False)
@@ -93,6 +94,8 @@ def _show(result: FitResult) -> None:
         style = "bold" if path in result.moved else ""
         numbers.add_row(words, unit, start, shown(number.value), told, style=style)
     out.print(numbers)
+    if result.estimated_from == "all":
+        out.print(Text(FROM_ALL_DATA), highlight=False)
     gaps = Table(box=SIMPLE_HEAD, title="RMS residual on held-out data", title_justify="left")
     for name in GAP_HEAD:
         gaps.add_column(name, justify="left" if name in GAP_HEAD[:2] else "right")

@@ -18,7 +18,7 @@ from hdsim.tell import fit_figures
 from hdsim.tell.beside import baselines
 from hdsim.tell.staging import staged
 from hdsim.tell.tables import numbers_table, table
-from hdsim.tell.words import named_number, short_cut_words, shown, spoken, started, unit_of
+from hdsim.tell.words import FROM_ALL_DATA, named_number, short_cut_words, shown, spoken, started, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,6 +116,8 @@ def page(found: Estimation, result: FitResult, pictures: dict[str, str]) -> str:
     css = files("hdsim.tell").joinpath("page.css").read_text(encoding="utf-8")
     said = html.escape(summary(result))
     numbers = numbers_table(result.numbers, result.moved)
+    if result.estimated_from == "all":
+        numbers += f"<p class='note'>{FROM_ALL_DATA}</p>"
     gaps = table(GAP_HEAD, gap_rows(result), range(2, len(GAP_HEAD)))
     gaps += "".join(f"<p>{html.escape(started(line))}.</p>" for line in baselines(result.gap))
     if result.short_cut:

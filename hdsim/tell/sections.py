@@ -13,7 +13,17 @@ from hdsim.diagnosis.screen import LEVEL
 from hdsim.diagnosis.verdict import Verdict
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import numbers_table, section, table, with_curve_words
-from hdsim.tell.words import percent, short, short_cut_words, shown, spoken, started, title_of, titles_of
+from hdsim.tell.words import (
+    FROM_ALL_DATA,
+    percent,
+    short,
+    short_cut_words,
+    shown,
+    spoken,
+    started,
+    title_of,
+    titles_of,
+)
 
 
 def confusions(verdict: Verdict) -> str:
@@ -132,6 +142,8 @@ def fitted(found: Findings) -> str:
             "the "
             "jackknife over blocks of time, valid for correlated residuals.</p>"
         )
+        if verdict.estimated_from == "all":
+            body += f"<p class='note'>{FROM_ALL_DATA}</p>"
     return section("Parameter estimates", body) if body else ""
 
 

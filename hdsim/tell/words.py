@@ -11,6 +11,11 @@ from hdsim.estimate.found import Gap, ParameterEstimate, ShortCut
 from hdsim.plot import units
 from hdsim.scenario.fields import split_unit
 
+#: Said beside numbers that held-out data helped to estimate.
+FROM_ALL_DATA = (
+    "Estimated from all data after the validation, held-out stretches included; the residuals are of the "
+    "estimates from the training data."
+)
 #: What stands where a number is not known.
 UNKNOWN = "not known"
 #: Standard deviations in a 95 % interval, from end to end; intervals are made of two to each side.
