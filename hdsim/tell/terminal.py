@@ -11,7 +11,7 @@ from hdsim.tell.beside import also_moved, baselines, last_model
 from hdsim.tell.findings import Findings
 from hdsim.tell.tables import gap_rows, with_curve_words
 from hdsim.tell.wording import KINDS, headline, sureness
-from hdsim.tell.words import odds, percent, title_of
+from hdsim.tell.words import FROM_ALL_DATA, odds, percent, title_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -88,6 +88,8 @@ def show(found: Findings, terminal: Console | None = None) -> None:
     line(sure.sentence)
     if beside := also_moved(verdict):
         line(beside)
+    if verdict.estimated_from == "all":
+        line(FROM_ALL_DATA)
     if verdict.gap:
         table = Table(box=SIMPLE_HEAD, title="\nRMS residual on held-out data", **_STYLE)
         for name in _HEAD:
