@@ -35,6 +35,7 @@ def diagnose(
     from hdsim.tell.findings import gather
     from hdsim.tell.save import save
     from hdsim.tell.terminal import Progress, show
+    from hdsim.tell.words import NOT_FROM_ALL_DATA
 
     scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
@@ -46,6 +47,8 @@ def diagnose(
         told = gather(found)
         report = save(found, model, out, told)
     show(told)
+    if all_data and found.verdict.estimated_from == "training":
+        click.echo(NOT_FROM_ALL_DATA)
     click.echo(f"report   {report}")
     if found.verdict.scenario:
         click.echo(f"scenario {found.verdict.scenario}")

@@ -47,6 +47,7 @@ def fit(
     from hdsim.estimate.outcome import result_of
     from hdsim.tell.fit_report import save_fit
     from hdsim.tell.terminal import Progress
+    from hdsim.tell.words import NOT_FROM_ALL_DATA
 
     scenario, records, held = opened(measured, holdout, mapping, model, out)
     with Progress() as tell:
@@ -57,6 +58,8 @@ def fit(
         tell("writing the report")
         page = save_fit(found, model, out)
     _show(result_of(found))
+    if all_data and found.estimated_from == "training":
+        click.echo(NOT_FROM_ALL_DATA)
     click.echo(f"report   {page}")
     click.echo(f"scenario {out / 'fitted.yaml'}")
     return 0

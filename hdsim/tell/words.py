@@ -16,6 +16,11 @@ FROM_ALL_DATA = (
     "Estimated from all data after the validation, held-out stretches included; the residuals are of the "
     "estimates from the training data."
 )
+#: Said where they could not.
+NOT_FROM_ALL_DATA = (
+    "--all-data: the estimates stay those of the training data, as beside an unidentified effect, or "
+    "where no prediction follows all data."
+)
 #: What stands where a number is not known.
 UNKNOWN = "not known"
 #: Standard deviations in a 95 % interval, from end to end; intervals are made of two to each side.

@@ -101,3 +101,24 @@ def test_friction_at_three_speeds_is_its_authors(tmp_path, stiffness):
     assert lara.RATIO * (coulomb + viscous * lara.RATIO * SPEEDS[0]) == pytest.approx(12.4, rel=0.02)
     # The zero is trusted, so nothing is said of one that would be one number with friction.
     assert not [p for p in found.data_problems if p.kind == "one way"]
+
+
+#: Of twelve bases the one that explains a part of friction as a loss under load.
+SPLIT = (1.0, True, True)
+
+
+@pytest.mark.study
+@pytest.mark.slow
+@pytest.mark.parametrize("base", [base for base in lara.BASES if base != SPLIT])
+def test_friction_is_its_authors_from_any_base(tmp_path, base):
+    """Whether it is the base's own or an effect."""
+    found = diagnose([lara.record()], lara.base(tmp_path, *base), zeros="trusted", all_data=True)
+    friction = found.final.state.drive.friction
+    coulomb, viscous = friction.coulomb_nm, friction.viscous_nm_s_per_rad
+    for effect in found.verdict.effects:
+        if effect.name == "input_coulomb_viscous":
+            coulomb += effect.parameters["coulomb_nm"].value
+            viscous += effect.parameters["viscous_nm_s_per_rad"].value
+    for speed, least, most in zip(SPEEDS, (1.0, 1.08, 1.09), (1.08, 1.11, 1.14), strict=True):
+        there = lara.RATIO * (coulomb + viscous * lara.RATIO * speed)
+        assert least < there / friction_nm(speed) < most

@@ -1,8 +1,12 @@
+import json
+
 import pytest
 from rig import model, record
 
 from hdsim.cli import main
+from hdsim.estimate import estimation
 from hdsim.recording import Column, Recording, Table
+from hdsim.tell.words import FROM_ALL_DATA, NOT_FROM_ALL_DATA
 
 
 @pytest.fixture
@@ -29,6 +33,18 @@ def test_a_log_gives_numbers_page_and_scenario(ask, tmp_path):
     for word in ("load mass", "95 % interval", "after/noise", "fit.html", "fitted.yaml"):
         assert word in out
     assert (tmp_path / "out" / "fit.html").exists()
+
+
+@pytest.mark.parametrize("followed", [True, False])
+def test_numbers_say_whether_they_are_of_all_data(ask, tmp_path, monkeypatch, followed):
+    if not followed:
+        monkeypatch.setattr(estimation, "on_all_rows", lambda bench, found: found)
+    code, out, err = ask("--out", str(tmp_path / "out"), "--fix", "motor_torque_gain", "--all-data")
+    assert code == 0, err
+    said = FROM_ALL_DATA if followed else NOT_FROM_ALL_DATA
+    assert " ".join(said.split()) in " ".join(out.split())
+    result = json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf-8"))
+    assert result["estimated_from"] == ("all" if followed else "training")
 
 
 @pytest.mark.parametrize(
