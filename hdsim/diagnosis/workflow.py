@@ -34,7 +34,7 @@ from hdsim.diagnosis.sentences import (
 )
 from hdsim.diagnosis.teeth import teeth_found
 from hdsim.diagnosis.verdict import Verdict
-from hdsim.estimate.all_data import all_rows, on_all_rows, refuse_held_out_records
+from hdsim.estimate.all_data import on_all_data, refuse_held_out_records
 from hdsim.estimate.asked import asked_for
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
@@ -266,8 +266,8 @@ def _diagnosed(
     final, counted = current, contextlib.ExitStack()
     if all_data and not unknown:
         with step("prove", "estimating the parameters from all data"):
-            counted.enter_context(all_rows(bench))
-            final = on_all_rows(bench, current, lambda fit: discrepancy(bench, fit, place) if lacks else None)
+            on_all = on_all_data(bench, current, lambda f: discrepancy(bench, f, place) if lacks else None)
+            final = counted.enter_context(on_all)
     intervals = base_intervals(final, base.freedoms)
     intervals += [i for i in base.intervals if i.name not in {j.name for j in intervals}]
     intervals, blurred = told_of_damping(bench, final.state, intervals)

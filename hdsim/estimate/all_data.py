@@ -36,32 +36,32 @@ def refuse_held_out_records(all_data: bool, holdout: Sequence[object]) -> None:
 
 
 @contextlib.contextmanager
-def all_rows(bench: Bench) -> Iterator[None]:
-    """Fits see the held-out stretches of the training records, for a while."""
-    counted = Counted(bench.series)
+def on_all_data(
+    bench: Bench, found: Fit, left: Callable[[Fit], tuple[Array, Array] | None] = lambda _: None
+) -> Iterator[Fit]:
+    """A fit carried on to the end that all rows ask for, which fits see for as long as it is looked at.
+
+    Args:
+        bench: the measured series.
+        found: the fit, at its end by the training rows.
+        left: columns and sizes of what else may have moved the numbers (``drifted``).
+
+    Yields:
+        The fit; ``found``, and its rows, where all of them cannot be followed.
+    """
+    counted, final = Counted(bench.series), found
     for series in bench.series:
         if series.record < bench.training:
             series.train = series.train | series.hold
     try:
-        yield
+        with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
+            there = sharpened(bench, replace(found, beside=None))
+            align(bench, there)
+            reweigh(bench, there)
+            there = together(bench, at_its_end(bench, there))
+            final = drifted(bench, there, left(there))
+        if final is found:
+            counted.put_back()
+        yield final
     finally:
         counted.put_back()
-
-
-def on_all_rows(
-    bench: Bench, found: Fit, left: Callable[[Fit], tuple[Array, Array] | None] = lambda _: None
-) -> Fit:
-    """A fit carried on to the end that all rows ask for; the same one where that cannot be predicted.
-
-    Args:
-        bench: the measured series, within `all_rows`.
-        found: the fit, at its end by fewer rows.
-        left: columns and sizes of what else may have moved the numbers (``drifted``).
-    """
-    with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
-        there = sharpened(bench, replace(found, beside=None))
-        align(bench, there)
-        reweigh(bench, there)
-        there = together(bench, at_its_end(bench, there))
-        return drifted(bench, there, left(there))
-    return found

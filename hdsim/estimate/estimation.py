@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hdsim.errors import InputError
-from hdsim.estimate.all_data import all_rows, on_all_rows, refuse_held_out_records
+from hdsim.estimate.all_data import on_all_data, refuse_held_out_records
 from hdsim.estimate.baseline import trees, with_baselines
 from hdsim.estimate.beginning import beginnings
 from hdsim.estimate.bench import Bench
@@ -186,14 +187,13 @@ def estimate(
     problems = [problem for check in checks for problem in check.problems]
     problems += [*suspicions(bench, found, start), *delays(bench, found.intervals)]
     problems += [*beginnings(bench), *one_way(bench), *moving_zeros(bench, found.fit.predictions)]
-    short_cut, seen = short_cut_of(bench, found.fit.predictions, predictions["after"]), None
+    judged = found.fit
     if all_data:
         tell("estimating the parameters from all data")
-        with all_rows(bench):
-            more = on_all_rows(bench, found.fit)
-            if more is not found.fit:
-                found.fit, found.intervals = more, base_intervals(more, found.freedoms)
-                seen = _directions(bench, more)
+    with on_all_data(bench, judged) if all_data else contextlib.nullcontext(judged) as final:
+        if final is not judged:
+            found.fit, found.intervals = final, base_intervals(final, found.freedoms)
+        seen = _directions(bench, final)
     found.intervals, blurred = told_of_damping(bench, found.fit.state, found.intervals)
     problems += [*unsettled(bench, found.fit), *blurred]
     own = found.fit.frees
@@ -212,7 +212,7 @@ def estimate(
         found.intervals,
         names,
         matrix,
-        seen or _directions(bench, found.fit),
+        seen,
         left,
         gap,
         _readings(bench, predictions["after"], begins),
@@ -222,8 +222,8 @@ def estimate(
         found.fit,
         found,
         predictions,
-        short_cut,
-        "all" if seen else "training",
+        short_cut_of(bench, judged.predictions, predictions["after"]),
+        "training" if found.fit is judged else "all",
     )
 
 

@@ -6,9 +6,12 @@ from rig import TRUTH, model, record
 
 import hdsim
 from hdsim.errors import InputError
-from hdsim.estimate.all_data import all_rows
+from hdsim.estimate import all_data
 from hdsim.estimate.opening import bench_for
+from hdsim.estimate.predict import PredictionError
 from hdsim.estimate.records import Record
+from hdsim.estimate.refit import refit
+from hdsim.estimate.state import state_of
 from hdsim.scenario import Scenario
 
 #: A rotor with friction, N m and N m s/rad, kg m2.
@@ -67,9 +70,12 @@ def test_friction_of_a_joint_that_stops_out_of_sight_is_known_by_all_data(seed):
 
 
 def test_all_rows_count_for_a_while_only(tmp_path):
-    bench = bench_for([record(0, 3.0)], [], model(tmp_path))
+    base = model(tmp_path)
+    bench = bench_for([record(0, 3.0)], [], base)
+    found = refit(bench, state_of(base)).fit
     before = [(series.train, series.hold) for series in bench.series]
-    with all_rows(bench):
+    with all_data.on_all_data(bench, found) as final:
+        assert final is not found
         for series, (train, hold) in zip(bench.series, before, strict=True):
             assert np.array_equal(series.train, train | hold)
     for series, (train, hold) in zip(bench.series, before, strict=True):
@@ -118,3 +124,21 @@ def test_records_that_are_held_out_stay_unseen(tmp_path):
     for run in (hdsim.fit, hdsim.diagnose):
         with pytest.raises(InputError, match="--all-data: records of --holdout are used in no fit"):
             run([one], model(tmp_path), holdout=[other], all_data=True)
+
+
+@pytest.mark.parametrize("friction", [1.3, 0.0])
+def test_where_all_data_cannot_be_followed_all_stays_as_it_was(monkeypatch, friction):
+    """A number that is wrong, and an effect that is missing."""
+    own = {key: friction * value for key, value in JOINT["drive"]["friction"].items()}
+    base = Scenario.model_validate({**JOINT, "drive": {**JOINT["drive"], "friction": own}})
+    part = hdsim.diagnose(starts_and_stops(0), base, zeros="trusted").verdict
+
+    def lost(bench, found):
+        raise PredictionError
+
+    monkeypatch.setattr(all_data, "together", lost)
+    whole = hdsim.diagnose(starts_and_stops(0), base, zeros="trusted", all_data=True).verdict
+    assert whole.estimated_from == "training"
+    assert part.verdict == ("effect" if friction == 0.0 else "parameter")
+    for what in ("sentence", "parameters", "moved", "effects", "gap"):
+        assert getattr(whole, what) == getattr(part, what)

@@ -4,7 +4,8 @@ import pytest
 from rig import model, record
 
 from hdsim.cli import main
-from hdsim.estimate import estimation
+from hdsim.estimate import all_data
+from hdsim.estimate.predict import PredictionError
 from hdsim.recording import Column, Recording, Table
 from hdsim.tell.words import FROM_ALL_DATA, NOT_FROM_ALL_DATA
 
@@ -35,10 +36,14 @@ def test_a_log_gives_numbers_page_and_scenario(ask, tmp_path):
     assert (tmp_path / "out" / "fit.html").exists()
 
 
+def lost(bench, found):
+    raise PredictionError
+
+
 @pytest.mark.parametrize("followed", [True, False])
 def test_numbers_say_whether_they_are_of_all_data(ask, tmp_path, monkeypatch, followed):
     if not followed:
-        monkeypatch.setattr(estimation, "on_all_rows", lambda bench, found: found)
+        monkeypatch.setattr(all_data, "together", lost)
     code, out, err = ask("--out", str(tmp_path / "out"), "--fix", "motor_torque_gain", "--all-data")
     assert code == 0, err
     said = FROM_ALL_DATA if followed else NOT_FROM_ALL_DATA
