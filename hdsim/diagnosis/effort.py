@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from hdsim.diagnosis.again import BEYOND_GAIN
+from hdsim.diagnosis.passes import Search
+from hdsim.diagnosis.sensitive import told_of_motion
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.fit import Fit
@@ -32,14 +34,19 @@ def enough_done(bench: Bench, passes: int) -> bool:
     return passes >= PASSES and work_of(bench) > MOST_WORK
 
 
-def told_of_end(bench: Bench, passes: int) -> Problem:
-    """The warning of a search that has ended so."""
+def told_of_end(bench: Bench, found: Search) -> list[Problem]:
+    """The warnings of a search that has ended so, or because the model answers to its motion's noise."""
+    if found.sensitive:
+        return [told_of_motion(bench)]
+    if not found.ended:
+        return []
+    passes = len(found.stages) - 1
     message = (
         f"the search has ended after {passes} passes: the predictions had taken {work_of(bench) / 1e6:.0f} "
         f"million integration steps, more than {MOST_WORK / 1e6:.0f}. What a further effect would explain is "
         "in the residual; `--thorough` goes on"
     )
-    return Problem(bench.predictors[0].record.name, "model", "search", "warning", message)
+    return [Problem(bench.predictors[0].record.name, "model", "search", "warning", message)]
 
 
 def more_could(bench: Bench, base: Fit, now: Fit) -> bool:

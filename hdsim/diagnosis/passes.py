@@ -28,7 +28,8 @@ class Search:
     """What a search found: its passes, the effects in the order of ``fit.state.added``, the last fit.
 
     ``better`` is the base without effects where its own numbers explain what the only one was given for.
-    Where it has done enough and not all is explained, it has ``ended``. All begins ``anew`` where a vibration
+    Where it has done enough and not all is explained, it has ``ended``; what is left may be no more than what
+    the motion's noise makes of a model as ``sensitive``. All begins ``anew`` where a vibration
     at the beginning of a record, or a shaft that sticks, was behind the first effects: it counts no more.
     What explains all that is left then is ``kept``. Of ``asked``, a fit, it is known that neither was.
     """
@@ -41,6 +42,7 @@ class Search:
     thorough: bool = False
     earlier: Fit | None = None
     ended: bool = False
+    sensitive: bool = False
     anew: bool = False
     kept: bool = False
     asked: Fit | None = None

@@ -38,7 +38,7 @@ def taken_back(bench: Bench, found: Search, k: int, tell: Callable[[str], object
     left = left_of(bench, fit)
     location = locate(bench, left, bench.residuals(fit.predictions, drift=True), fit.state.delays)
     last = replace(found.stages[-1], location=location, power=left.power)
-    return Search(fit, left, [*found.stages[:-1], last], named, ended=found.ended)
+    return Search(fit, left, [*found.stages[:-1], last], named, ended=found.ended, sensitive=found.sensitive)
 
 
 def remains(evidence: Evidence) -> Remains | None:

@@ -24,18 +24,19 @@ from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.given import is_all, over_the_given
 from hdsim.diagnosis.held import hopeless
 from hdsim.diagnosis.late import lines_shown, read_late
-from hdsim.diagnosis.locate import SHARP, locate
+from hdsim.diagnosis.locate import SHARP, Location, locate
 from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
 from hdsim.diagnosis.passes import Search, Stage
 from hdsim.diagnosis.point import from_where_it_was
 from hdsim.diagnosis.rest import only_sticks, sticks_beside
 from hdsim.diagnosis.revise import base_alone, revised
 from hdsim.diagnosis.screen import LEVEL, Residual
+from hdsim.diagnosis.sensitive import within_motion_noise
 from hdsim.diagnosis.traces import ranked_anew, screen
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.fit import Fit, sharpened
 from hdsim.estimate.flanks import nothing_but_flanks, of_other_flanks
-from hdsim.estimate.refit import align, as_far_as_promised, reweigh, together, unlikelihood, with_delays
+from hdsim.estimate.refit import align, as_far_as_promised, reweigh, together, with_delays
 from hdsim.estimate.short_cut import follow_teeth
 from hdsim.estimate.standstill import has_a_sign
 
@@ -126,12 +127,17 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
             for other in found.named:
                 one.group.pop(other.name, None)  # what is there by itself is no other name of this
         # What is left is what this fit leaves, not the rough one before it.
-        found.left = left_of(bench, found.fit)
         last = found.stages[-1]
-        residuals = bench.residuals(found.fit.predictions, drift=True)
-        last.location = locate(bench, found.left, residuals, found.fit.state.delays)
+        last.location = _located(bench, found)
         last.power = found.left.power
     return found
+
+
+def _located(bench: Bench, found: Search) -> Location:
+    """Where the search's last fit leaves something; sets what."""
+    found.left = left_of(bench, found.fit)
+    residuals = bench.residuals(found.fit.predictions, drift=True)
+    return locate(bench, found.left, residuals, found.fit.state.delays)
 
 
 def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Fit | None:
@@ -139,20 +145,27 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     current = found.fit = read_late(bench, found.fit)
     title = "refit" if not found.named else f"with {found.named[-1].name}"
     during("locate", f"locating the residual {title}")
-    found.left = left_of(bench, current)
-    residuals = bench.residuals(current.predictions, drift=True)
-    location = locate(bench, found.left, residuals, current.state.delays)
+    location = _located(bench, found)
+    more = not found.named or more_could(bench, base, current)
+    if bench.swings and not more and location.sharp(LEVEL):
+        # Lines so near the noise may be what a swing leaves that is short of its end.
+        align(bench, current)
+        current = found.fit = together(bench, sharpened(bench, current), rough=True)
+        location = _located(bench, found)
+    more = more or location.sharp(LEVEL)
     stage = Stage(title, location, found.left.power)
     found.stages.append(stage)
-    found.ended = False
+    found.ended = found.sensitive = False
     if nothing_but_flanks(bench, stage.power, found.left.project):
         return None
     # Names that take each other's place would go on for ever.
     if len(found.named) == MOST_EFFECTS or len(found.stages) == MOST_STAGES:
         return None
-    more = not found.named or stage.location.sharp(LEVEL) or more_could(bench, base, current)
-    found.ended = more and not found.thorough and enough_done(bench, len(found.stages) - 1)
-    if found.ended or not more:
+    may_end = more and not found.thorough
+    found.ended = may_end and enough_done(bench, len(found.stages) - 1)
+    lines = location.lines if location.sharp(LEVEL) else ()
+    found.sensitive = bool(may_end and found.named and within_motion_noise(bench, current, lines))
+    if found.ended or found.sensitive or not more:
         return None
     fitted: Fitted = {} if found.named else from_where_it_was(bench, base, found.earlier)
     named = _one_more(bench, base, current, found, stage, bool(found.named), during, fitted)
@@ -170,15 +183,18 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
         if sticks_beside(bench, current, named.fit, traces):
             found.anew, stage.named = True, named
             return named.fit
-    current = _finished(bench, base, found, named, during)
-    if not found.named and not is_all(bench, current):
-        if heard(bench, found.fit, current):
-            found.anew, stage.named = True, named
-            return current
-        found.asked = current
-        # What is found again after all began anew, from beside a base that it had set right, is asked once.
-        if named.name not in fitted:
-            named, current = _or_over_the_given(bench, base, found, stage, named, current, during)
+    current = plain = _near_its_end(bench, found, named)
+    alone = not found.named
+    # A beginning that swings is not explained by a finer formula, which would take long to try.
+    anew = alone and not is_all(bench, plain) and heard(bench, found.fit, plain, rests=False)
+    if not anew:
+        current = _finished(bench, base, found, named, plain, during)
+        if alone and not is_all(bench, current):
+            anew = heard(bench, found.fit, current, beginnings=current is not plain)
+            found.asked = current
+    if anew:
+        found.anew, stage.named = True, named
+        return current
     stage.named = named
     found.named.append(named)
     align(bench, current)
@@ -203,41 +219,26 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     return current
 
 
-def _or_over_the_given(
-    bench: Bench,
-    base: Fit,
-    found: Search,
-    stage: Stage,
-    named: Named,
-    current: Fit,
-    during: Callable[[str, str], Step],
-) -> tuple[Named, Fit]:
-    """The first effect, or one over the base as given where that is likelier once both are finished."""
-    screening = stage.screening
-    other = over_the_given(bench, found.fit, frozenset(), math.inf, stage, named, during)
-    if other is not None and other is not named and _matters(bench, base, found, stage, other, found.left):
-        its = _finished(bench, base, found, other, during)
-        if unlikelihood(bench, its, its) < unlikelihood(bench, current, its):
-            return other, its
-    stage.screening = screening
-    return named, current
+def _near_its_end(bench: Bench, found: Search, named: Named) -> Fit:
+    """The model with an effect more, a first one near its optimum."""
+    current = named.fit
+    if found.named:
+        return current
+    # A base that carried nothing could tell nothing of its springs.
+    current = together(bench, current, rough=True) if current.undetermined else current
+    return as_far_as_promised(bench, sharpened(bench, current))
 
 
 def _finished(
-    bench: Bench, base: Fit, found: Search, named: Named, during: Callable[[str, str], Step]
+    bench: Bench, base: Fit, found: Search, named: Named, plain: Fit, during: Callable[[str, str], Step]
 ) -> Fit:
-    """The model with an effect more, in a finer formula where that explains more, near its optimum."""
-    current = named.fit
-    if not found.named:
-        # A base that carried nothing could tell nothing of its springs.
-        current = together(bench, current, rough=True) if current.undetermined else current
-        current = sharpened(bench, current)
+    """The model with an effect more in a finer formula where that explains more, near its optimum."""
+    current = plain
     if named.worth_finer:
-        own, rivals = current, named.look_alikes(bench, found.fit)
-        current = refined(bench, base, own, partial(during, "fit"), rivals)
+        current = refined(bench, base, plain, partial(during, "fit"), named.look_alikes(bench, found.fit))
         if current.state.added[-1].effect != named.name:
-            named.gives_way(bench, found.fit, own, current)
-    return as_far_as_promised(bench, current)
+            named.gives_way(bench, found.fit, plain, current)
+    return current if current is plain and not found.named else as_far_as_promised(bench, current)
 
 
 def _one_more(

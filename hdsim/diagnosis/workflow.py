@@ -260,9 +260,7 @@ def _diagnosed(
     problems += [*doubts, *beginnings(bench), *one_way(bench), *moving_zeros(bench, current.predictions)]
     silent = decision.kind in ("nothing", "parameter")
     problems += unseen(bench, predictions["after"], slightly=silent)
-    problems += [*jumped(bench, jumps), *unsettled(bench, current)]
-    if found.ended:
-        problems.append(told_of_end(bench, len(found.stages) - 1))
+    problems += [*jumped(bench, jumps), *unsettled(bench, current), *told_of_end(bench, found)]
     final, counted = current, contextlib.ExitStack()
     if all_data and not unknown:
         with step("prove", "estimating the parameters from all data"):

@@ -16,7 +16,7 @@ class Problem:
         record: name of the record.
         channel: name of the channel, or ``time``.
         kind: gap, missing, spikes, slips, dead, saturated, clock, unit, sign, ratio, side, drive, one way,
-            zero, beginning, held out, jump, unsettled, resonance, search.
+            zero, beginning, held out, jump, unsettled, resonance, search, motion.
         severity: an ``error`` stops a diagnosis.
         message: what was found, with the numbers that say so.
         count: samples concerned.

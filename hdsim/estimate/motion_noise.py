@@ -41,7 +41,7 @@ def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Arr
             left[s.channel] = max(_spread(rest[s.train]), left.get(s.channel, 0.0))
     heard = [s.noise for s in bench.series]
     for state in states:
-        for index, change in _answers(bench, state):
+        for index, change in answers(bench, state):
             s, rows = bench.series[index], bench.series[index].train | bench.series[index].hold
             if not rows.any():
                 continue
@@ -55,11 +55,17 @@ def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Arr
         s.noise = noise
 
 
-def _answers(bench: Bench, state: State) -> Iterator[tuple[int, Array]]:
-    """What another reading of motion and load changes in each series that a model then predicts."""
+def answers(bench: Bench, state: State, seed: int = 0) -> Iterator[tuple[int, Array]]:
+    """What another reading of motion and load changes in each series that a model then predicts.
+
+    Args:
+        bench: the measured series.
+        state: the model.
+        seed: of the draw.
+    """
     candidate = state.candidate()
     for index, predictor in enumerate(bench.predictors):
-        other = predictor.disturbed()
+        other = predictor.disturbed(seed)
         try:
             here, there = predictor.predict(candidate), other.predict(candidate)
         except PredictionError:

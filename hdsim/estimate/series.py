@@ -39,6 +39,10 @@ class Series:
     sigma: float = 1.0
     own_zero: bool = False
 
+    def __post_init__(self) -> None:
+        #: Noise of the sensor alone, whatever else is heard.
+        self.sensor = self.noise
+
 
 class Counted:
     """What counts of some series, and by how much, to be put back where a trial with less has failed.

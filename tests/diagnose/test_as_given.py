@@ -74,33 +74,6 @@ def test_a_fit_is_all_where_it_has_reached_the_noise_and_has_not_bent_the_base(f
         assert is_all(bench, replace(found, frees=frees)) is expected
 
 
-@pytest.mark.parametrize(
-    ("all_explained", "again", "asked"),
-    [(True, None, 0), (False, None, 1), (False, "unbalance", 1), (False, "motor_torque_ripple", 0)],
-)
-def test_a_first_effect_is_asked_for_over_the_given_only_where_one_over_the_fit_is_not_all(
-    fitted, monkeypatch, all_explained, again, asked
-):
-    """Nor where it is found again after all began anew."""
-    bench, found = fitted
-    named, calls = SimpleNamespace(name="motor_torque_ripple", fit=found, worth_finer=False), []
-
-    def over_the_given(*args):
-        calls.append(args)
-        return named
-
-    monkeypatch.setattr(searching, "_one_more", lambda *_: named)
-    monkeypatch.setattr(searching, "_finished", lambda *_: found)
-    monkeypatch.setattr(searching, "over_the_given", over_the_given)
-    monkeypatch.setattr(searching, "is_all", lambda *_: all_explained)
-    monkeypatch.setattr(searching, "from_where_it_was", lambda *_: {again: (found, True)} if again else {})
-    monkeypatch.setattr(searching, "nothing_but_flanks", lambda *_: False)
-    search = searching.Search(found, searching.left_of(bench, found))
-    assert searching._next(bench, found, search, lambda *_: lambda _: None) is found
-    assert search.named == [named]
-    assert len(calls) == asked
-
-
 def test_what_no_longer_counts_beside_a_first_effect_is_heard_before_the_given_is_asked(fitted, monkeypatch):
     bench, found = fitted
     named = SimpleNamespace(name="motor_torque_ripple", fit=found, worth_finer=False)
@@ -113,6 +86,7 @@ def test_what_no_longer_counts_beside_a_first_effect_is_heard_before_the_given_i
         return True
 
     monkeypatch.setattr(searching, "_one_more", lambda *_: named)
+    monkeypatch.setattr(searching, "_near_its_end", lambda *_: found)
     monkeypatch.setattr(searching, "_finished", lambda *_: found)
     monkeypatch.setattr(searching, "over_the_given", lambda *_: asked.append("given"))
     monkeypatch.setattr(searching, "is_all", lambda *_: False)
@@ -120,7 +94,7 @@ def test_what_no_longer_counts_beside_a_first_effect_is_heard_before_the_given_i
     monkeypatch.setattr(anew, "let_swing", lambda _, now: now)
     monkeypatch.setattr(anew, "hear_swing", lambda *_: False)
     monkeypatch.setattr(anew, "hear_rest", rests)
-    monkeypatch.setattr(anew, "is_all", lambda *_: False)
+    monkeypatch.setattr(anew, "_near", lambda *_: False)
     counted = Counted(bench.series)
     for series in bench.series:
         series.sigma *= 3.0
