@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from hdsim.diagnosis.contest import confusable
+from hdsim.diagnosis.locate import Location, locate
 from hdsim.diagnosis.name import SAME, Named, freedom, level, name_effect
 from hdsim.diagnosis.revise import carried_on, without
 from hdsim.diagnosis.screen import LEVEL, Residual
@@ -193,6 +194,12 @@ def left_of(bench: Bench, current: Fit) -> Residual:
     return Residual(
         bench.stacked(bench.residuals(current.predictions, drift=True)), columns, bench.stacked_blocks()
     )
+
+
+def located(bench: Bench, current: Fit) -> tuple[Residual, Location]:
+    """What a fit leaves, and where."""
+    left, residuals = left_of(bench, current), bench.residuals(current.predictions, drift=True)
+    return left, locate(bench, left, residuals, current.state.delays)
 
 
 def gain(bench: Bench, base: Fit, before: Fit, now: Fit) -> float:

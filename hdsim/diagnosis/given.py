@@ -1,4 +1,4 @@
-"""An effect that is named over the base's numbers as given: asked where one over the fitted base is not all.
+"""An effect that is named over the base's numbers as given, where none over the fitted base is enough.
 
 A fit may bend the base far to stand in for a part of what is missing, and what is left then is no trace of it
 any more. What is named over the numbers as given is taken where it is likelier.

@@ -51,12 +51,17 @@ def point_at(bench: Bench, base: Fit, theta: Array) -> Point:
     )  # fmt: skip
 
 
+def theta_given(found: Fit) -> Array:
+    """The base's numbers as given, as logarithms of factors on a fit's, shape (f,); delays stay."""
+    return np.array([0.0 if free.step else free.none for free in at_present(found)])
+
+
 def given_point(bench: Bench, found: Fit) -> Point | None:
     """A fit's model with the base's numbers as given, whatever it began from; delays are no model's and stay.
 
     None where none of them has gone far, or where nothing can be predicted.
     """
-    theta = np.array([0.0 if free.step else free.none for free in at_present(found)])
+    theta = theta_given(found)
     if np.any(np.abs(theta) > FAR):
         with contextlib.suppress(PredictionError, np.linalg.LinAlgError):
             return point_at(bench, found, theta)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from hdsim.diagnosis.again import left_of
+from hdsim.diagnosis.again import located
 from hdsim.diagnosis.evidence import Evidence
-from hdsim.diagnosis.locate import locate
 from hdsim.diagnosis.passes import Search
 from hdsim.diagnosis.revise import revised
 from hdsim.diagnosis.rules import RULES
@@ -35,8 +34,7 @@ def taken_back(bench: Bench, found: Search, k: int, tell: Callable[[str], object
     named = [replace(one) for j, one in enumerate(found.named) if j != k]
     fit = together(bench, gone_with(found.fit, k))
     fit = revised(bench, fit, named, tell)
-    left = left_of(bench, fit)
-    location = locate(bench, left, bench.residuals(fit.predictions, drift=True), fit.state.delays)
+    left, location = located(bench, fit)
     last = replace(found.stages[-1], location=location, power=left.power)
     return Search(fit, left, [*found.stages[:-1], last], named, ended=found.ended, sensitive=found.sensitive)
 

@@ -15,7 +15,17 @@ from functools import partial
 
 import numpy as np
 
-from hdsim.diagnosis.again import BEYOND_GAIN, NEWS, Step, again, gain, instead, left_of, part_of_lines
+from hdsim.diagnosis.again import (
+    BEYOND_GAIN,
+    NEWS,
+    Step,
+    again,
+    gain,
+    instead,
+    left_of,
+    located,
+    part_of_lines,
+)
 from hdsim.diagnosis.anew import begun_anew, gone_on_with, heard
 from hdsim.diagnosis.beyond import beyond_curves
 from hdsim.diagnosis.contest import FAR_LEFT_IN, Fitted
@@ -24,7 +34,7 @@ from hdsim.diagnosis.finer import each_refined, refined
 from hdsim.diagnosis.given import is_all, over_the_given
 from hdsim.diagnosis.held import hopeless
 from hdsim.diagnosis.late import lines_shown, read_late
-from hdsim.diagnosis.locate import SHARP, Location, locate
+from hdsim.diagnosis.locate import SHARP
 from hdsim.diagnosis.name import LEAST_SHARE, LINEAR, Named, name_effect
 from hdsim.diagnosis.passes import Search, Stage
 from hdsim.diagnosis.point import from_where_it_was
@@ -128,16 +138,9 @@ def _settled(bench: Bench, base: Fit, found: Search, during: Callable[[str, str]
                 one.group.pop(other.name, None)  # what is there by itself is no other name of this
         # What is left is what this fit leaves, not the rough one before it.
         last = found.stages[-1]
-        last.location = _located(bench, found)
+        found.left, last.location = located(bench, found.fit)
         last.power = found.left.power
     return found
-
-
-def _located(bench: Bench, found: Search) -> Location:
-    """Where the search's last fit leaves something; sets what."""
-    found.left = left_of(bench, found.fit)
-    residuals = bench.residuals(found.fit.predictions, drift=True)
-    return locate(bench, found.left, residuals, found.fit.state.delays)
 
 
 def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], Step]) -> Fit | None:
@@ -145,13 +148,13 @@ def _next(bench: Bench, base: Fit, found: Search, during: Callable[[str, str], S
     current = found.fit = read_late(bench, found.fit)
     title = "refit" if not found.named else f"with {found.named[-1].name}"
     during("locate", f"locating the residual {title}")
-    location = _located(bench, found)
+    found.left, location = located(bench, current)
     more = not found.named or more_could(bench, base, current)
     if bench.swings and not more and location.sharp(LEVEL):
         # Lines so near the noise may be what a swing leaves that is short of its end.
         align(bench, current)
         current = found.fit = together(bench, sharpened(bench, current), rough=True)
-        location = _located(bench, found)
+        found.left, location = located(bench, current)
     more = more or location.sharp(LEVEL)
     stage = Stage(title, location, found.left.power)
     found.stages.append(stage)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hdsim.diagnosis.point import theta_given
 from hdsim.estimate.bench import Bench
 from hdsim.estimate.data_problems import Problem
 from hdsim.estimate.fit import Fit, at_present
@@ -45,8 +46,7 @@ def within_motion_noise(bench: Bench, found: Fit, lines: Sequence[Line] = ()) ->
     """
     if bench.power(found.predictions) <= REACHED * bench.noise_power:
         return False
-    frees = at_present(found)
-    given = scaled(found.state, frees, [0.0 if free.step else free.none for free in frees])
+    given = scaled(found.state, at_present(found), theta_given(found).tolist())
     with bench.coarse(), contextlib.suppress(PredictionError):
         return any(_not_contradicted(bench, state, lines) for state in (given, found.state))
     return False
@@ -54,15 +54,15 @@ def within_motion_noise(bench: Bench, found: Fit, lines: Sequence[Line] = ()) ->
 
 def _not_contradicted(bench: Bench, state: State, lines: Sequence[Line]) -> bool:
     """Whether of some records drawn anew one changes as much, of each channel and of the lines."""
-    predictions = bench.predict(state)
-    left = _powers(bench, bench.residuals(predictions), state, lines)
+    left = _powers(bench, bench.residuals(bench.predict(state)), state, lines)
     missed = {what for what in left if left[what] > REACHED * bench.noise_powers.get(what, 0.0)}
     if not missed:
         return False  # numbers that explain all, where the fit has not come
     for s in bench.series:
         left[s.channel] -= float(s.train.sum()) * (s.sensor / s.sigma) ** 2
-    for seed in range(DRAWS):
-        changed = _powers(bench, _change(bench, state, predictions, seed), state, lines)
+    for changes in answers(bench, state, DRAWS, everything=False):
+        whole = [changes.get(k, np.zeros(len(s.measured))) for k, s in enumerate(bench.series)]
+        changed = _powers(bench, bench.centred(whole), state, lines)
         missed -= {what for what in missed if changed[what] >= left[what]}
         if not missed:
             return True
@@ -72,21 +72,8 @@ def _not_contradicted(bench: Bench, state: State, lines: Sequence[Line]) -> bool
 
 
 def _powers(bench: Bench, values: list[Array], state: State, lines: Sequence[Line]) -> dict[str, float]:
-    """Power of residuals or changes in each channel's training samples, and in lines."""
-    owner, whole = bench.stacked_series(), bench.stacked(values)
-    found = dict.fromkeys(bench.channels, 0.0)
-    for index, series in enumerate(bench.series):
-        found[series.channel] += float(np.sum(whole[owner == index] ** 2))
-    return found | ({LINES: power_of(bench, values, lines, state.delays)} if lines else {})
-
-
-def _change(bench: Bench, state: State, predictions: list[Array], seed: int) -> list[Array]:
-    """What a record drawn anew changes in the training series, sensors' zeros removed."""
-    changes = [np.zeros(len(values)) for values in predictions]
-    for index, change in answers(bench, state, seed):
-        if len(changes[index]):
-            changes[index] = change
-    return bench.centred(changes)
+    """Power of residuals or changes in each channel, and in lines."""
+    return bench.powers(values) | ({LINES: power_of(bench, values, lines, state.delays)} if lines else {})
 
 
 def told_of_motion(bench: Bench) -> Problem:

@@ -269,8 +269,12 @@ class Bench:
 
     def channel_powers(self, predictions: Sequence[Array]) -> dict[str, float]:
         """Power of the whitened training residual in each channel."""
+        return self.powers(self.residuals(predictions))
+
+    def powers(self, residuals: Sequence[Array]) -> dict[str, float]:
+        """Power of residuals, or of changes, of all series in each channel's training samples, whitened."""
         found = dict.fromkeys(self.channels, 0.0)
-        for series, residual in zip(self.series, self.residuals(predictions), strict=True):
+        for series, residual in zip(self.series, residuals, strict=True):
             if series.record < self.training:
                 found[series.channel] += float(np.sum((residual[series.train] / series.sigma) ** 2))
         return found

@@ -7,6 +7,7 @@ of the compared channel has it.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -41,7 +42,7 @@ def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Arr
             left[s.channel] = max(_spread(rest[s.train]), left.get(s.channel, 0.0))
     heard = [s.noise for s in bench.series]
     for state in states:
-        for index, change in answers(bench, state):
+        for index, change in next(answers(bench, state, 1)).items():
             s, rows = bench.series[index], bench.series[index].train | bench.series[index].hold
             if not rows.any():
                 continue
@@ -55,29 +56,38 @@ def hear_motion(bench: Bench, states: Sequence[State], predictions: Sequence[Arr
         s.noise = noise
 
 
-def answers(bench: Bench, state: State, seed: int = 0) -> Iterator[tuple[int, Array]]:
-    """What another reading of motion and load changes in each series that a model then predicts.
+def answers(bench: Bench, state: State, draws: int, *, everything: bool = True) -> Iterator[dict[int, Array]]:
+    """What other readings of motion and load change in the series that a model then predicts.
 
     Args:
         bench: the measured series.
         state: the model.
-        seed: of the draw.
+        draws: how many of them.
+        everything: of the held-out records too.
+
+    Yields:
+        Of each reading, by the series' numbers, those that could be predicted, shape (n,) each.
     """
-    candidate = state.candidate()
-    for index, predictor in enumerate(bench.predictors):
-        other = predictor.disturbed(seed)
-        try:
-            here, there = predictor.predict(candidate), other.predict(candidate)
-        except PredictionError:
-            continue
-        for k, s in enumerate(bench.series):
-            if s.record != index:
-                continue
-            change = state.reading(s.channel, bench.time_of(s), there[s.channel] - here[s.channel])
-            if s.channel == "output_angle" and not predictor.plan.locked:
-                # It is compared beside the motor's angle, which has moved as well.
-                change = change - (other.motor_angle - predictor.motor_angle) / predictor.ratio
-            yield k, change
+    candidate, here = state.candidate(), {}
+    for index in range(len(bench.predictors) if everything else bench.training):
+        with contextlib.suppress(PredictionError):
+            here[index] = bench.predictors[index].predict(candidate)
+    for seed in range(draws):
+        changes: dict[int, Array] = {}
+        for index, own in here.items():
+            predictor = bench.predictors[index]
+            other = predictor.disturbed(seed)
+            with contextlib.suppress(PredictionError):
+                there = other.predict(candidate)
+                for k, s in enumerate(bench.series):
+                    if s.record != index:
+                        continue
+                    change = state.reading(s.channel, bench.time_of(s), there[s.channel] - own[s.channel])
+                    if s.channel == "output_angle" and not predictor.plan.locked:
+                        # It is compared beside the motor's angle, which has moved as well.
+                        change = change - (other.motor_angle - predictor.motor_angle) / predictor.ratio
+                    changes[k] = change
+        yield changes
 
 
 def _spread(values: Array) -> float:

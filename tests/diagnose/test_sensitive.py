@@ -81,11 +81,13 @@ def test_one_in_ten_draws_decides_and_far_from_it_the_first(fitted, monkeypatch,
     bench, found = fitted
     draws: list[int] = []
 
-    def change(bench, state, predictions, seed):
-        draws.append(seed)
-        return [np.sqrt(power) * rest for rest in bench.residuals(predictions)]
+    def answers(bench, state, count, **_):
+        for seed in range(count):
+            draws.append(seed)
+            rests = bench.residuals(bench.predict(state))
+            yield {k: np.sqrt(power) * rest for k, rest in enumerate(rests)}
 
-    monkeypatch.setattr(sensitive, "_change", change)
+    monkeypatch.setattr(sensitive, "answers", answers)
     assert not within_motion_noise(bench, found)
     assert draws == 2 * list(range(asked))  # as given, and as it is
 
